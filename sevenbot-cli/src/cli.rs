@@ -9,9 +9,9 @@ use crate::command_error::CommandError;
 #[cfg(unix)]
 use crate::commands::sim;
 use crate::commands::{
-    backup, baud, calibrate, convert, effector, get, info, log, model, monitor, move_to, park, play, plot,
-    ports, pose, position, record, recover, registers, serve, servo, set, shell, sniff, state, status, stop,
-    stream, view,
+    backup, baud, calibrate, class, convert, effector, get, info, log, model, monitor, move_to, park, play,
+    plot, ports, pose, position, record, recover, registers, serve, servo, set, shell, sniff, state, status,
+    stop, stream, view,
 };
 use crate::session::Session;
 
@@ -37,7 +37,7 @@ Exit status:
        connection was lost; an arm that was moving may go on
   130  interrupted by Ctrl-C; a moving arm then holds its position. A second
        Ctrl-C ends at once. Where Ctrl-C is the way to end, it is 0: `monitor`,
-       `log`, `record`, `serve`, `view`
+       `log`, `record`, `serve`, `view`, `class`
 
 With --json, notes, warnings and errors are JSON, too: one object in a line on
 standard error. {\"error\": TEXT, \"advice\": [TEXT, ...], \"status\": NUMBER},
@@ -123,6 +123,7 @@ pub(crate) enum Command {
     Sniff(sniff::SniffArgs),
     Serve(serve::ServeArgs),
     View(view::ViewArgs),
+    Class(class::ClassArgs),
     Servo(servo::ServoArgs),
     #[cfg(unix)]
     Sim(sim::SimArgs),
@@ -169,6 +170,7 @@ impl Command {
             Self::Sniff(args) => sniff::run(session, &args),
             Self::Serve(args) => serve::run(session, &args),
             Self::View(args) => view::run(session, &args),
+            Self::Class(args) => class::run(session, &args),
             Self::Servo(args) => servo::run(session, &args),
             #[cfg(unix)]
             Self::Sim(args) => sim::run(session, &args),
@@ -186,7 +188,7 @@ impl Command {
         match self {
             Self::Ports(_) | Self::Plot(_) | Self::Sniff(_) | Self::Servo(_) | Self::Registers(_) => false,
             Self::Convert(_) | Self::Model(_) | Self::Completions(_) | Self::Man(_) => false,
-            Self::Serve(_) | Self::View(_) => false,
+            Self::Serve(_) | Self::View(_) | Self::Class(_) => false,
             #[cfg(unix)]
             Self::Sim(_) => false,
             _ => true,

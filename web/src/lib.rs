@@ -16,6 +16,7 @@
 #[cfg(target_arch = "wasm32")]
 mod app;
 pub mod arm_state;
+pub mod class;
 pub mod client;
 mod confirmed;
 pub mod exercise;

@@ -31,6 +31,7 @@ const GROUPS: [Group; 3] = [
             "sevenbot",
             "recording-formats",
             "sevenbot-cli",
+            "classroom",
             "sevenbot-serve",
             "sevenbot-python",
             "sevenbot-web",

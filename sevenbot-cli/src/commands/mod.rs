@@ -3,6 +3,7 @@
 pub(crate) mod backup;
 pub(crate) mod baud;
 pub(crate) mod calibrate;
+pub(crate) mod class;
 pub(crate) mod convert;
 pub(crate) mod effector;
 pub(crate) mod get;

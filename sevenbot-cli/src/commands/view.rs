@@ -3,14 +3,15 @@
 use std::net::{Ipv4Addr, SocketAddr};
 
 use clap::Args;
-use rust_embed::RustEmbed;
 use sevenbot::simulated::simulated_port;
 use sevenbot_serve::hub::HubOptions;
 use sevenbot_serve::server::{ArmLocation, PageConfig, Server, ServerConfig, StartError};
 
 use super::serve::{Ready, check_not_busy, default_local, location, run_server, stop_signal};
 use crate::command_error::CommandError;
+use crate::page_file;
 use crate::printer::note;
+use crate::secret::new_secret;
 use crate::session::Session;
 
 /// The port that is tried first. A browser keeps its permissions and settings for each port.
@@ -53,26 +54,15 @@ pub(crate) struct ViewArgs {
     simulate: bool,
 }
 
-/// The page, if `cargo xtask web` had built it before this program was built.
-#[derive(RustEmbed)]
-#[folder = "../web/dist"]
-#[allow_missing = true]
-struct PageFile;
-
 pub(crate) fn run(session: &mut Session, args: &ViewArgs) -> Result<(), CommandError> {
-    if PageFile::get("index.html").is_none() {
-        return Err(CommandError::Usage(
-            "this program was built without the page: in the project's folder, `cargo view` builds and opens it"
-                .to_owned(),
-        ));
-    }
+    page_file::check()?;
     let arm = if args.simulate { None } else { find_arm(session)? };
     arm.iter().try_for_each(|arm| check_not_busy(arm, session.options.baud))?;
-    let token = token()?;
+    let token = new_secret()?;
     let page = PageConfig {
         address: SocketAddr::from((Ipv4Addr::LOCALHOST, args.http.unwrap_or(USUAL_PORT))),
         token: token.clone(),
-        files: |path| PageFile::get(path).map(|file| file.data),
+        files: page_file::find,
     };
     let query = if arm.is_some() { format!("?token={token}") } else { String::new() };
     let local = arm.as_ref().and_then(|_| default_local(None));
@@ -121,25 +111,5 @@ fn open(mut config: ServerConfig, any_port: bool) -> Result<Server, StartError> 
             Server::open(config)
         }
         outcome => outcome,
-    }
-}
-
-/// 128 random bits.
-fn token() -> Result<String, CommandError> {
-    let mut bytes = [0_u8; 16];
-    let failed = |reason| CommandError::Arm(format!("the operating system has no random numbers: {reason}"));
-    getrandom::fill(&mut bytes).map_err(failed)?;
-    Ok(bytes.iter().map(|byte| format!("{byte:02x}")).collect())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn each_token_is_another_one() {
-        let tokens = [token().expect("a token"), token().expect("a token")];
-        assert!(tokens.iter().all(|token| token.len() == 32));
-        assert_ne!(tokens[0], tokens[1]);
     }
 }

@@ -36,6 +36,10 @@ pub(crate) struct ArmHold {
     is_streaming: bool,
     /// The joints to hold at their positions, one bit each; `None`: not known yet.
     moving: Option<u8>,
+    /// Those of them whose set-points move, one bit each.
+    driven: u8,
+    /// A joint whose set-point moves was not measured yet: it goes on once it is.
+    has_unmeasured: bool,
     rounds: u8,
     sent: Vec<Frame>,
     /// Joints that a client held after the last read was sent, one bit each.
@@ -57,6 +61,8 @@ impl ArmHold {
             is_fine,
             is_streaming,
             moving,
+            driven: 0,
+            has_unmeasured: false,
             rounds: 0,
             sent: Vec::new(),
             held_meanwhile: 0,
@@ -107,6 +113,11 @@ impl ArmHold {
         self.is_done || self.rounds >= MOST_ROUNDS
     }
 
+    /// Has the arm confirmed that it holds?
+    pub(crate) const fn is_confirmed(&self) -> bool {
+        self.is_done && !self.has_unmeasured
+    }
+
     /// The reply did not come.
     pub(crate) const fn note_no_reply(&mut self) {
         self.waits = false;
@@ -119,6 +130,7 @@ impl ArmHold {
             // The set-point of a silent joint stands still, and would go on to its target.
             let moving = values.iter().fold(0, |bits, value| bits | value);
             self.moving = Some(moving);
+            self.driven = values.last().copied().unwrap_or_default();
             self.is_done = moving == 0 && !self.is_streaming;
             return Vec::new();
         };
@@ -130,6 +142,11 @@ impl ArmHold {
             self.is_done = true;
             return Vec::new();
         }
+        let is_unmeasured = |joint: Joint| {
+            let position = self.value(values, address, self.rows().1.of(joint));
+            self.driven & joint.bit() != 0 && position == Some(UNMEASURED)
+        };
+        self.has_unmeasured = Joint::ALL.into_iter().any(is_unmeasured);
         self.sent = self.frames_that_hold(moving, address, values, held);
         self.is_done = self.sent.is_empty();
         self.sent.clone()
@@ -220,6 +237,21 @@ mod tests {
         values[8..14].copy_from_slice(&[27, 28, 29, 30, 31, 32]);
         assert_eq!(hold.frames(128, &values, &HeldTargets::default()), []);
         assert!(hold.is_over());
+    }
+
+    #[test]
+    fn a_joint_that_moves_and_was_not_measured_is_not_held() {
+        for (moving, is_confirmed) in [(0b100, false), (0b1, true)] {
+            let mut hold = hold(moving, false);
+            for _ in 0..2 {
+                assert_eq!(hold.next_read(), Some((128, 28)));
+                let mut values = values();
+                values[..2].copy_from_slice(&[21, 22]);
+                hold.frames(128, &values, &HeldTargets::default());
+            }
+            assert!(hold.is_over());
+            assert_eq!(hold.is_confirmed(), is_confirmed, "{moving:b}");
+        }
     }
 
     #[test]

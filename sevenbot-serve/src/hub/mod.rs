@@ -94,6 +94,8 @@ pub struct Hub {
     watchdog: ClientWatchdog,
     /// The hub holds the arm by itself.
     hold: Option<ArmHold>,
+    /// The last hold ended, and the arm has confirmed it.
+    has_held: bool,
     held: HeldTargets,
     driver: Driver,
     /// Stops of all clients so far, wrapping.
@@ -118,6 +120,7 @@ impl Hub {
             sampler: Sampler::new(baud),
             watchdog: ClientWatchdog::default(),
             hold: None,
+            has_held: false,
             held: HeldTargets::default(),
             driver: Driver::new(options.has_one_driver),
             stops: 0,
@@ -161,11 +164,24 @@ impl Hub {
 
     /// Holds the arm; after the hold in progress, if there is one.
     fn start_hold(&mut self) {
+        self.has_held = false;
         if let Some(hold) = &mut self.hold {
             return hold.want_again();
         }
         let is_streaming = self.known.word(SET_POINT_PERIOD.address) != 0;
         self.hold = Some(ArmHold::new(self.known.is_ours(), is_streaming));
+    }
+
+    /// Is the hub about to hold the arm by itself?
+    #[must_use]
+    pub const fn is_holding(&self) -> bool {
+        self.hold.is_some()
+    }
+
+    /// Has the arm confirmed the last hold of the hub, and is no other one in progress?
+    #[must_use]
+    pub const fn has_held(&self) -> bool {
+        self.has_held
     }
 
     /// The clients that have something new since the last call: events, or room for requests.
@@ -207,7 +223,7 @@ impl Hub {
     /// Nothing of what was sent or waits may reach the arm that comes next.
     fn forget_arm(&mut self) {
         self.line.reset();
-        self.hold = None;
+        (self.hold, self.has_held) = (None, false);
         self.held = HeldTargets::default();
         self.driver.end(None);
         for (&id, client) in &mut self.clients {

@@ -70,7 +70,7 @@ impl Hub {
         match hold.is_over() {
             false => self.hold = Some(hold),
             true if hold.is_wanted_again() => self.start_hold(),
-            true => {}
+            true => self.has_held = hold.is_confirmed(),
         }
     }
 

@@ -45,11 +45,16 @@ impl Admission {
     /// Places for so many clients, and for as many connections that have not shown their token: all programs of a server may come
     /// back at once.
     pub(super) fn new(most: usize) -> Arc<Self> {
+        Self::with_unknown(most, most)
+    }
+
+    /// Places for so many clients, and for so many connections that have not shown a token, or get a file.
+    pub(super) fn with_unknown(most: usize, most_unknown: usize) -> Arc<Self> {
         Arc::new(Self {
-            connections: Arc::new(Semaphore::new(2 * most + WAYS_IN)),
+            connections: Arc::new(Semaphore::new(most + most_unknown + WAYS_IN)),
             clients: Arc::new(Semaphore::new(most)),
             unknown: Mutex::default(),
-            most_unknown: most,
+            most_unknown,
             wrong: Mutex::default(),
         })
     }

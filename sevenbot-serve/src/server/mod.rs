@@ -3,7 +3,8 @@
 //! ```text
 //!   ArmPort ◀──▶ Shared: Hub ◀─┬─▶ FrameSession ◀──▶ PtyPort, or byte_connection: TCP, TLS, Unix socket
 //!                              ├─▶ FrameSession ◀──▶ web_socket ◀──▶ WebServer: HTTP, files of the page
-//!                              └─▶ MakerSession ◀──▶ web_socket
+//!                              ├─▶ MakerSession ◀──▶ web_socket
+//!                              └─▶ Class ◀──▶ ClassSession ◀──▶ web_socket
 //! ```
 //!
 //! One task serves the arm's port, and one each connection. All run in one thread: the arm's line carries at most some thousand
@@ -11,17 +12,22 @@
 
 mod access;
 mod admission;
+mod answer;
 mod arm_location;
 mod arm_port;
 mod arm_serial;
 mod breakage;
 mod byte_connection;
 mod byte_server;
+mod class;
+mod class_session;
+mod class_site;
 mod descriptors;
 mod frame_session;
 mod listener;
 #[cfg(unix)]
 mod local_socket;
+mod new_key;
 mod notice;
 mod pace;
 #[cfg(target_os = "linux")]
@@ -40,11 +46,12 @@ mod web_server;
 mod web_socket;
 
 use std::io;
-use std::net::SocketAddr;
+use std::net::{IpAddr, SocketAddr};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
+use classroom::{ClassInfo, Classroom, MOST_PUPILS};
 use tokio::net::TcpListener;
 use tokio::runtime::{Builder, Runtime};
 use tokio::sync::mpsc;
@@ -53,6 +60,8 @@ use tokio_rustls::TlsAcceptor;
 use self::admission::Admission;
 use self::arm_port::ArmPort;
 use self::byte_server::ByteServer;
+use self::class::Class;
+use self::class_site::ClassSite;
 use self::listener::open_tcp;
 #[cfg(unix)]
 use self::local_socket::LocalSocket;
@@ -69,15 +78,21 @@ use self::web_server::WebServer;
 use crate::hub::{Hub, HubOptions};
 
 pub use self::access::AccessPolicy;
+pub use self::answer::PageFiles;
 pub use self::arm_location::ArmLocation;
+pub use self::new_key::NewKey;
 pub use self::notice::{Notice, RefusalReason};
-pub use self::site::{PageConfig, PageFiles};
+pub use self::site::{ClassConfig, PageConfig};
 pub use self::start_error::StartError;
 pub use self::stop::Stop;
 pub use self::tls::TlsFiles;
 
 /// Notices about refused clients that may wait. More are dropped.
 const MOST_NOTICES: usize = 4;
+/// Connections with which a browser loads the page. A class opens it all at once.
+const FILES_OF_EACH_TAB: usize = 4;
+/// Teacher's screens, and sessions with the arm of a class.
+const OTHER_TABS: usize = 8;
 /// Time between two notices about refused clients, so that a flood of them fills no log.
 const NOTICE_PERIOD: Duration = Duration::from_millis(200);
 
@@ -102,9 +117,11 @@ pub struct ServerConfig {
     pub web_socket: Option<SocketAddr>,
     /// The page for a browser.
     pub page: Option<PageConfig>,
+    /// The page for a class.
+    pub class: Option<ClassConfig>,
     /// Who may connect over TCP and the maker's WebSocket.
     pub access: AccessPolicy,
-    /// TCP and the maker's WebSocket are encrypted.
+    /// TCP, the maker's WebSocket and the class are encrypted.
     pub tls: Option<TlsFiles>,
     /// What clients may do.
     pub options: HubOptions,
@@ -122,6 +139,7 @@ impl ServerConfig {
             tcp: None,
             web_socket: None,
             page: None,
+            class: None,
             access: AccessPolicy { token: None, allows_any_page: false },
             tls: None,
             options: HubOptions { is_read_only: false, has_one_driver: false },
@@ -138,6 +156,7 @@ pub struct Server {
     tcp: Option<TcpListener>,
     web_socket: Option<TcpListener>,
     page: Option<TcpListener>,
+    class: Option<TcpListener>,
     tls: Option<TlsSettings>,
     config: ServerConfig,
 }
@@ -167,8 +186,9 @@ impl Server {
         let tcp = config.tcp.map(open_tcp).transpose()?;
         let web_socket = config.web_socket.map(open_tcp).transpose()?;
         let page = config.page.as_ref().map(|page| open_tcp(page.address)).transpose()?;
+        let class = config.class.as_ref().map(|class| open_tcp(class.address)).transpose()?;
         drop(inside);
-        Ok(Self { runtime, ptys, socket, tcp, web_socket, page, tls, config })
+        Ok(Self { runtime, ptys, socket, tcp, web_socket, page, class, tls, config })
     }
 
     /// The path of the Unix socket.
@@ -195,12 +215,25 @@ impl Server {
         address(self.page.as_ref())
     }
 
+    /// The address of the class, with the port that the system chose for port 0.
+    #[must_use]
+    pub fn class_address(&self) -> Option<SocketAddr> {
+        address(self.class.as_ref())
+    }
+
+    /// The address of the class's page for a browser that reaches this host.
+    #[must_use]
+    pub fn class_page(&self, host: IpAddr) -> Option<String> {
+        let port = self.class_address()?.port();
+        Some(class_site::page(host, port, self.tls.is_some()))
+    }
+
     /// Serves until it is stopped.
     ///
     /// # Errors
     /// The operating system fails: a pseudo-terminal.
     pub fn run(self, stop: &Stop, notify: &mut dyn FnMut(Notice)) -> io::Result<()> {
-        let Self { runtime, ptys, socket, tcp, web_socket, page, tls, config } = self;
+        let Self { runtime, ptys, socket, tcp, web_socket, page, class, tls, config } = self;
         runtime.block_on(async {
             let shared = Shared::new(Hub::new(config.baud, config.options), config.baud);
             tokio::spawn(Arc::clone(&shared).beat());
@@ -222,6 +255,7 @@ impl Server {
             }
             let network =
                 Network { shared, notices: Notices(refusals), tls: tls.map(|TlsSettings(tls)| tls) };
+            network.spawn_class(&config, class);
             network.spawn(&config, socket, tcp, web_socket, page);
             let mut next_refusal = tokio::time::Instant::now();
             loop {
@@ -282,6 +316,23 @@ impl Network {
         }
     }
 
+    /// Serves the class, if there is one. Pupils never take the places of the teacher's screens and of the arm.
+    fn spawn_class(&self, config: &ServerConfig, listener: Option<TcpListener>) {
+        let (Some(listener), Some(settings)) = (listener, config.class.clone()) else { return };
+        let ClassConfig { files, code, secret, hosts, new_key, .. } = settings;
+        let port = listener.local_addr().map_or(0, |address| address.port());
+        let is_encrypted = self.tls.is_some();
+        let addresses = hosts.into_iter().map(|host| class_site::page(host, port, is_encrypted)).collect();
+        let info = ClassInfo { addresses, code: code.clone(), has_arm: config.arm.is_some() };
+        let class = Class::new(Arc::clone(&self.shared), Classroom::new(info));
+        tokio::spawn(Arc::clone(&class).run());
+        let site = Site::Class(ClassSite { files, code, secret, class: Arc::clone(&class), is_encrypted });
+        let admission =
+            Admission::with_unknown(MOST_PUPILS + OTHER_TABS, FILES_OF_EACH_TAB * descriptors::connections());
+        let server = self.web(site, self.tls.clone(), &admission);
+        tokio::spawn(WebServer { class: Some((class, new_key)), ..server }.serve(listener));
+    }
+
     fn bytes(&self, config: &ServerConfig, admission: &Arc<Admission>) -> ByteServer {
         ByteServer {
             shared: Arc::clone(&self.shared),
@@ -299,6 +350,7 @@ impl Network {
             notices: self.notices.clone(),
             site,
             tls,
+            class: None,
         }
     }
 }

@@ -3,25 +3,19 @@
 //! The files are public: they are part of the program. The arm is behind the token, and `Host` and `Origin` have to be this
 //! server's own (see [`super::access`] for the reason).
 
-use std::borrow::Cow;
 use std::fmt;
-use std::net::SocketAddr;
-use std::path::Path;
+use std::net::{IpAddr, SocketAddr};
 
-use http_body_util::Full;
-use hyper::body::Bytes;
-use hyper::header::{CONTENT_TYPE, HeaderValue};
-use hyper::{Method, Request, Response, StatusCode};
-use tungstenite::handshake::server::create_response_with_body;
+use hyper::{Method, Request, StatusCode};
 
-use super::access::{AccessPolicy, Refusal, is_address, token_of};
+use super::access::{AccessPolicy, Refusal, token_of};
+use super::answer::{Answer, PageFiles, Protocol, accept, check_origin, file, own_host, refusal};
+use super::class_site::ClassSite;
+use super::new_key::NewKey;
 use crate::token::is_equal;
 
 /// The path of the WebSocket with frames.
 const FRAMES: &str = "/frames";
-
-/// Finds a file of the page by its path below the root, such as `index.html`.
-pub type PageFiles = fn(&str) -> Option<Cow<'static, [u8]>>;
 
 /// A page to serve.
 #[derive(Clone)]
@@ -32,6 +26,30 @@ pub struct PageConfig {
     pub token: String,
     /// The files.
     pub files: PageFiles,
+}
+
+/// A class to serve.
+#[derive(Clone)]
+pub struct ClassConfig {
+    /// Where to listen.
+    pub address: SocketAddr,
+    /// The files of the page, and of the teacher's screen at `teacher.html`.
+    pub files: PageFiles,
+    /// What pupils have to type; `None`: nothing, which is for this computer only.
+    pub code: Option<String>,
+    /// The secret that the teacher's screen needs, `/teacher?token=SECRET`.
+    pub secret: String,
+    /// The addresses of this computer that pupils open, for the teacher's screen.
+    pub hosts: Vec<IpAddr>,
+    /// Makes the secrets of pupils.
+    pub new_key: NewKey,
+}
+
+impl fmt::Debug for ClassConfig {
+    /// Without the secrets.
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.debug_struct("ClassConfig").field("address", &self.address).finish_non_exhaustive()
+    }
 }
 
 impl fmt::Debug for PageConfig {
@@ -48,6 +66,8 @@ pub(super) enum Site {
     Page(PageSite),
     /// The maker's WebSocket.
     Maker(AccessPolicy),
+    /// The page for a class, and the teacher's screen.
+    Class(ClassSite),
 }
 
 /// The page, and its WebSocket with frames.
@@ -58,25 +78,6 @@ pub(super) struct PageSite {
     pub(super) has_arm: bool,
 }
 
-/// What a WebSocket carries.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Protocol {
-    Frames,
-    /// `is_browser`: the request came from a page.
-    Maker {
-        is_browser: bool,
-    },
-}
-
-/// The answer to a request.
-#[derive(Debug)]
-pub(super) enum Answer {
-    /// A whole answer. The connection is closed after it.
-    Whole(Response<Full<Bytes>>),
-    /// The connection is a WebSocket after this.
-    Upgrade(Response<Full<Bytes>>, Protocol),
-}
-
 impl Site {
     /// Answers a request.
     pub(super) fn answer<B>(&self, request: &Request<B>) -> Answer {
@@ -85,45 +86,34 @@ impl Site {
         }
         let answer = match self {
             Self::Page(page) => page.answer(request),
+            Self::Class(class) => class.answer(request),
             Self::Maker(access) => {
                 access.check(request).and_then(|is_browser| accept(request, Protocol::Maker { is_browser }))
             }
         };
         answer.unwrap_or_else(|(status, text)| Answer::Whole(refusal(status, text)))
     }
-}
 
-fn accept<B>(request: &Request<B>, protocol: Protocol) -> Result<Answer, Refusal> {
-    create_response_with_body(request, Full::default)
-        .map(|response| Answer::Upgrade(response, protocol))
-        .map_err(|_| (StatusCode::BAD_REQUEST, "Here is a WebSocket.\n"))
+    /// Is the answer for everybody, whatever secret they know?
+    pub(super) fn is_public<B>(&self, request: &Request<B>) -> bool {
+        match self {
+            Self::Page(_) => request.uri().path() != FRAMES,
+            Self::Class(_) => !ClassSite::needs_secret(request),
+            Self::Maker(_) => false,
+        }
+    }
 }
 
 impl PageSite {
     fn answer<B>(&self, request: &Request<B>) -> Result<Answer, Refusal> {
-        let host = header(request, "host")
-            .filter(|host| is_address(host))
-            .ok_or((StatusCode::FORBIDDEN, "Host: use the IP address of the server, or localhost.\n"))?;
-        if request.uri().path() == FRAMES { self.frames(request, host) } else { self.file(request, host) }
-    }
-
-    fn file<B>(&self, request: &Request<B>, host: &str) -> Result<Answer, Refusal> {
-        let path = request.uri().path().strip_prefix('/').unwrap_or_default();
-        let path = if path.is_empty() { "index.html" } else { path };
-        let body = (self.files)(path).ok_or((StatusCode::NOT_FOUND, "The page has no such file.\n"))?;
-        let mut response = response(StatusCode::OK, content_type(path), Bytes::from_owner(body));
-        if let Ok(policy) = HeaderValue::from_str(&content_security_policy(host)) {
-            response.headers_mut().insert("content-security-policy", policy);
-        }
-        Ok(Answer::Whole(response))
+        let host = own_host(request)?;
+        let is_frames = request.uri().path() == FRAMES;
+        if is_frames { self.frames(request, host) } else { file(self.files, request, host, false) }
     }
 
     /// Only this page may connect, and only with the token.
     fn frames<B>(&self, request: &Request<B>, host: &str) -> Result<Answer, Refusal> {
-        let is_own = |origin: &str| origin.strip_prefix("http://") == Some(host);
-        if request.headers().contains_key("origin") && !header(request, "origin").is_some_and(is_own) {
-            return Err((StatusCode::FORBIDDEN, "Origin: only this server's own page can connect.\n"));
-        }
+        check_origin(request, host, false)?;
         let given = token_of(request.uri()).unwrap_or_default();
         if !is_equal(given.as_bytes(), self.token.as_bytes()) {
             return Err((StatusCode::UNAUTHORIZED, "Token: connect to /frames?token=TOKEN.\n"));
@@ -135,60 +125,14 @@ impl PageSite {
     }
 }
 
-fn header<'a, B>(request: &'a Request<B>, name: &str) -> Option<&'a str> {
-    request.headers().get(name)?.to_str().ok()
-}
-
-/// An answer that refuses.
-pub(super) fn refusal(status: StatusCode, text: &'static str) -> Response<Full<Bytes>> {
-    response(status, "text/plain; charset=utf-8", Bytes::from_static(text.as_bytes()))
-}
-
-fn response(status: StatusCode, content_type: &'static str, body: Bytes) -> Response<Full<Bytes>> {
-    let mut response = Response::new(Full::new(body));
-    *response.status_mut() = status;
-    let headers = response.headers_mut();
-    headers.insert(CONTENT_TYPE, HeaderValue::from_static(content_type));
-    for (name, value) in [
-        ("content-security-policy", "default-src 'none'"),
-        ("x-content-type-options", "nosniff"),
-        ("referrer-policy", "no-referrer"),
-        ("cross-origin-resource-policy", "same-origin"),
-        ("cache-control", "no-store"),
-        ("connection", "close"),
-    ] {
-        headers.insert(name, HeaderValue::from_static(value));
-    }
-    response
-}
-
-/// The page loads nothing from elsewhere, runs no script from a string, and no other page can frame it. The editor of programs
-/// has pictures as `data:` addresses.
-fn content_security_policy(host: &str) -> String {
-    format!(
-        "default-src 'self'; script-src 'self' 'wasm-unsafe-eval'; img-src 'self' data:; connect-src 'self' ws://{host}; base-uri 'none'; \
-         form-action 'none'; frame-ancestors 'none'"
-    )
-}
-
-fn content_type(path: &str) -> &'static str {
-    match Path::new(path).extension().and_then(|extension| extension.to_str()) {
-        Some("html") => "text/html; charset=utf-8",
-        Some("css") => "text/css; charset=utf-8",
-        Some("js") => "text/javascript; charset=utf-8",
-        Some("wasm") => "application/wasm",
-        Some("svg") => "image/svg+xml",
-        Some("png") => "image/png",
-        Some("json") => "application/json",
-        Some("webmanifest") => "application/manifest+json",
-        _ => "application/octet-stream",
-    }
-}
-
 #[cfg(test)]
 #[allow(clippy::unwrap_used)] // A panic is a failed test.
 mod tests {
     use super::*;
+    use http_body_util::Full;
+    use hyper::Response;
+    use hyper::body::Bytes;
+    use std::borrow::Cow;
     const HOST: (&str, &str) = ("host", "127.0.0.1:7780");
 
     fn files(path: &str) -> Option<Cow<'static, [u8]>> {

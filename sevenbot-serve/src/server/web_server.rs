@@ -13,7 +13,6 @@ use std::time::Duration;
 
 use http_body_util::Full;
 use hyper::body::{Bytes, Incoming};
-use hyper::header::UPGRADE;
 use hyper::server::conn::http1;
 use hyper::upgrade::OnUpgrade;
 use hyper::{Request, Response, StatusCode};
@@ -25,13 +24,17 @@ use tokio_rustls::TlsAcceptor;
 use tower_http::compression::Compression;
 
 use super::admission::{Admission, Place};
+use super::answer::{Answer, Protocol, refusal};
 use super::breakage::Breakage;
 use super::byte_connection::ByteStream;
+use super::class::Class;
+use super::class_session::ClassSession;
 use super::listener::{SEND_BUFFER, accept_tcp};
+use super::new_key::NewKey;
 use super::notice::{Notice, Notices, RefusalReason};
 use super::shared::{Shared, lock};
-use super::site::{Answer, Protocol, Site, refusal};
-use super::web_socket::{serve_frames, serve_maker};
+use super::site::Site;
+use super::web_socket::{serve_frames, serve_maker, serve_text};
 
 /// How long a request and its answer may take.
 const TIMEOUT: Duration = Duration::from_secs(30);
@@ -50,6 +53,8 @@ pub(super) struct WebServer {
     pub(super) notices: Notices,
     pub(super) site: Site,
     pub(super) tls: Option<TlsAcceptor>,
+    /// The class, if the site is one, and how it gets the keys of its pupils.
+    pub(super) class: Option<(Arc<Class>, NewKey)>,
 }
 
 /// An accepted request for a WebSocket.
@@ -86,9 +91,17 @@ impl WebServer {
         drop::<Socket>(socket);
         let stream = TokioIo::new(connection);
         let serve = async {
-            match protocol {
-                Protocol::Frames => serve_frames(&self.shared, stream).await,
-                Protocol::Maker { is_browser } => serve_maker(&self.shared, stream, is_browser).await,
+            match (protocol, &self.class) {
+                (Protocol::Frames, _) => serve_frames(&self.shared, stream).await,
+                (Protocol::Maker { is_browser }, _) => serve_maker(&self.shared, stream, is_browser).await,
+                (Protocol::Class(role), Some((class, new_key))) => {
+                    let Some(key) = new_key() else { return };
+                    serve_text(&self.shared, stream, || ClassSession::open(class, role, key)).await;
+                }
+                (Protocol::LentArm(lease), Some((class, _))) => {
+                    class.while_lent(lease, serve_frames(&self.shared, stream)).await;
+                }
+                (Protocol::Class(_) | Protocol::LentArm(_), None) => {}
             }
         };
         let _ = breakage.or_end(serve).await;
@@ -122,7 +135,7 @@ impl WebServer {
         upgrade: &Mutex<Option<Upgrade>>,
     ) -> Response<Full<Bytes>> {
         // The files are public: only what needs the token waits for it.
-        if request.headers().contains_key(UPGRADE) {
+        if !self.site.is_public(&request) {
             self.admission.wait(Some(peer.ip())).await;
         }
         let (response, protocol) = match self.site.answer(&request) {

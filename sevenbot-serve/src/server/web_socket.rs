@@ -145,7 +145,7 @@ where
 }
 
 /// What a client's messages are for.
-trait Session {
+pub(super) trait Session {
     /// Carries out what came, as far as possible. Returns the next message for the client, if it `can_send` one.
     fn advance(&mut self, can_send: bool) -> Option<Message>;
 
@@ -245,6 +245,14 @@ where
     S: AsyncRead + AsyncWrite + Unpin + Send + 'static,
 {
     serve(shared, stream, LONGEST_COMMAND, || MakerSession::open(shared, is_browser)).await;
+}
+
+/// Serves a client whose messages are text, with a session that is opened once the WebSocket is.
+pub(super) async fn serve_text<S, T: Session>(shared: &Shared, stream: S, session: impl FnOnce() -> T)
+where
+    S: AsyncRead + AsyncWrite + Unpin + Send + 'static,
+{
+    serve(shared, stream, LONGEST_COMMAND, session).await;
 }
 
 /// Serves a client until it ends. `longest`: bytes of its longest message.

@@ -56,18 +56,18 @@ const KEPT: [&str; 5] = [
 /// One browser at a time: it renders in software, and uses all processors.
 static TURN: Mutex<()> = Mutex::new(());
 
-/// A running browser with a profile of its own, and one page.
+/// A running browser with a profile of its own.
 #[derive(Debug)]
 pub struct Chromium {
-    /// The connection to the page.
-    pub page: Connection,
+    /// Where its DevTools listen, without `ws://`.
+    address: String,
     _process: RunningProgram,
     _profile: TempDir,
     _turn: MutexGuard<'static, ()>,
 }
 
 impl Chromium {
-    /// Starts a browser with an empty page.
+    /// Starts a browser, which has no window.
     #[must_use]
     pub fn start() -> Self {
         let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
@@ -77,12 +77,18 @@ impl Chromium {
         command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped());
         let mut process = RunningProgram::spawn(&mut command);
         let address = line_after("DevTools listening on ws://", process.stderr.take());
+        Self { address, _process: process, _profile: profile, _turn: turn }
+    }
+
+    /// Opens an empty page in a window of its own, so that it is not in the background.
+    #[must_use]
+    pub fn open_page(&self) -> Connection {
         let is_kept = |event: &Value| KEPT.iter().any(|method| event["method"] == *method);
-        let mut page = Connection::open(&address, is_kept);
-        let target = page.call("Target.createTarget", json!({ "url": "about:blank" }));
+        let mut page = Connection::open(&self.address, is_kept);
+        let target = page.call("Target.createTarget", json!({ "url": "about:blank", "newWindow": true }));
         let attach = json!({ "targetId": target["targetId"], "flatten": true });
         let session = page.call("Target.attachToTarget", attach);
         page.session = session["sessionId"].as_str().map(str::to_owned);
-        Self { page, _process: process, _profile: profile, _turn: turn }
+        page
     }
 }

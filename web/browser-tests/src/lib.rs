@@ -11,6 +11,7 @@
 //! the processor, and with `LATE_TEST=1000` each step of a test comes up to 1,000 ms late, while the arm goes on.
 
 pub mod browser;
+pub mod class_run;
 pub mod connection;
 pub mod firefox;
 pub mod input;
@@ -18,5 +19,6 @@ pub mod page;
 pub mod picture;
 pub mod viewed;
 
+pub use class_run::ClassRun;
 pub use page::Page;
 pub use viewed::Viewed;

@@ -1,12 +1,14 @@
 //! A page in the browser: its values, its pictures, its faults and what it requested.
 
+use std::rc::Rc;
+
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde_json::{Value, json};
 use system_tests::wait::{wait_for, wait_until};
 
 use crate::browser::Chromium;
-use crate::connection::variable;
+use crate::connection::{Connection, variable};
 use crate::picture::Picture;
 
 /// The register that tells which joints have a moving set-point.
@@ -27,7 +29,8 @@ const KEEP_TEXTS: &str = "
 /// An open page.
 #[derive(Debug)]
 pub struct Page {
-    browser: Chromium,
+    connection: Connection,
+    browser: Rc<Chromium>,
     /// The number of kept texts up to the last one that the test waited for.
     heard: usize,
 }
@@ -62,7 +65,17 @@ impl Page {
     /// As [`Self::open`]. `script` runs before the scripts of the page.
     #[must_use]
     pub fn open_after(url: &str, script: &str) -> Self {
-        let mut page = Self { browser: Chromium::start(), heard: 0 };
+        Self::open_in(Rc::new(Chromium::start()), url, script)
+    }
+
+    /// Opens an address in another window of the same browser. `script` runs before the scripts of the page.
+    #[must_use]
+    pub fn open_beside(&self, url: &str, script: &str) -> Self {
+        Self::open_in(Rc::clone(&self.browser), url, script)
+    }
+
+    fn open_in(browser: Rc<Chromium>, url: &str, script: &str) -> Self {
+        let mut page = Self { connection: browser.open_page(), browser, heard: 0 };
         for domain in ["Page", "Log", "Network", "Runtime"] {
             page.call(&format!("{domain}.enable"), json!({}));
         }
@@ -113,7 +126,7 @@ impl Page {
     /// Calls a method of the DevTools protocol.
     #[track_caller]
     pub fn call(&mut self, method: &str, parameters: Value) -> Value {
-        self.browser.page.call(method, parameters)
+        self.connection.call(method, parameters)
     }
 
     /// The value of a JavaScript expression, which may wait.
@@ -126,7 +139,7 @@ impl Page {
             "awaitPromise": true,
             "returnByValue": true,
         });
-        let mut answer = self.browser.page.try_call("Runtime.evaluate", parameters)?;
+        let mut answer = self.connection.try_call("Runtime.evaluate", parameters)?;
         match answer.get("exceptionDetails") {
             Some(exception) => Err(exception.to_string()),
             None => Ok(answer["result"]["value"].take()),
@@ -281,7 +294,7 @@ impl Page {
     }
 
     fn errors_so_far(&self) -> impl Iterator<Item = &Value> {
-        self.browser.page.events.iter().filter_map(|event| {
+        self.connection.events.iter().filter_map(|event| {
             let details = &event["params"];
             match event["method"].as_str()? {
                 "Runtime.exceptionThrown" => Some(details),
@@ -300,7 +313,7 @@ impl Page {
             "Network.webSocketCreated" => event["params"]["url"].as_str().map(str::to_owned),
             _ => None,
         };
-        self.browser.page.events.iter().filter_map(url).collect()
+        self.connection.events.iter().filter_map(url).collect()
     }
 
     /// Waits for the events of all that has happened.

@@ -74,7 +74,7 @@ impl Viewed {
     }
 }
 
-fn simulator(folder: &TempDir) -> RunningProgram {
+pub(crate) fn simulator(folder: &TempDir) -> RunningProgram {
     let mut command = Command::new(host_sim());
     command.args(["--quiet", "--eeprom", "none", "--link"]).arg(folder.path().join("arm"));
     process::start(&mut command, 1).expect("the simulator is ready").0

@@ -88,7 +88,8 @@ impl App {
             }
             "tour-end" => self.end_tour(),
             "close-notice" => self.dom.end_notice(),
-            _ if self.act_on_program(action) || self.act_on_exercise(action) => {}
+            _ if self.act_on_class(action) || self.act_on_program(action) || self.act_on_exercise(action) => {
+            }
             _ => self.control(action, value),
         }
     }
@@ -166,7 +167,7 @@ impl App {
         }
     }
 
-    fn stop(&mut self) {
+    pub(super) fn stop(&mut self) {
         let now = self.now();
         if self.stop_program(now) {
             return;
@@ -249,17 +250,30 @@ impl App {
 
     fn choose_source(&mut self) {
         let line = match self.dom.choice("source").as_str() {
-            "server" => SocketSource::connect().map(|source| Line::Remote(Box::new(source))).ok(),
+            "server" => self.server_arm().map(|source| Line::Remote(Box::new(source))).ok(),
             "usb" => SerialSource::ask().map(|source| Line::Remote(Box::new(source))),
             _ => Some(Line::Simulated(Box::default())),
         };
         match line {
             Some(line) => self.set_line(line),
+            None if self.class.is_some() => {
+                self.dom.choose("source", "simulator");
+                self.set_line(Line::Simulated(Box::default()));
+                self.dom.notice(self.language.text("not-your-arm"));
+            }
             None => {
                 self.dom.choose("source", "simulator");
                 self.set_line(Line::Simulated(Box::default()));
                 self.dom.notice(self.language.text("no-serial"));
             }
+        }
+    }
+
+    /// The arm at the server: in a class the real one, while this tab has it.
+    fn server_arm(&self) -> Result<SocketSource, JsValue> {
+        match &self.class {
+            None => SocketSource::connect(),
+            Some(class) => SocketSource::connect_with(&class.arm_query().ok_or("another tab has it")?),
         }
     }
 
@@ -285,8 +299,10 @@ impl App {
         let target = event.target().and_then(|target| target.dyn_into::<Element>().ok());
         let kind = target.as_ref().map(Element::tag_name).unwrap_or_default();
         if key.key() == " " {
-            // Also on buttons, where the space bar would press them: a stop works from everywhere.
-            event.prevent_default();
+            // Also on buttons, where the space bar would press them: a stop works from everywhere. A name may have a space.
+            if target.as_ref().is_none_or(|target| target.id() != "class-name") {
+                event.prevent_default();
+            }
             event.stop_propagation();
             return self.stop();
         }
@@ -296,6 +312,9 @@ impl App {
         }
         if key.key() == "Escape" {
             self.end_tour();
+        }
+        if key.key() == "Enter" && target.as_ref().is_some_and(|target| target.id().starts_with("class-")) {
+            self.act_on_class("join-class");
         }
         // The same number again is no change. A joint that was blocked is told to try again with it.
         if key.key() == "Enter"

@@ -15,6 +15,9 @@
 //!                     keys; tests)
 //! ```
 
+mod class;
+mod class_socket;
+mod class_tab;
 mod controls;
 mod dom;
 mod editor;
@@ -56,6 +59,7 @@ pub fn start() -> Result<(), JsValue> {
         app.set_language(app.language);
         app.show_first_arm();
         app.open_link();
+        app.open_class();
     });
     request_frames()
 }

@@ -10,6 +10,7 @@ use wasm_bindgen::prelude::Closure;
 use wasm_bindgen::{JsCast, JsValue};
 use web_sys::{CanvasRenderingContext2d, Element, Event};
 
+use super::class_tab::ClassTab;
 use super::dom::Dom;
 use super::exercise_list::Exercises;
 use super::kept_recording::KeptRecording;
@@ -23,6 +24,7 @@ use crate::recorder::Recorder;
 use crate::scene::{Part, Scene};
 use crate::source::simulator::SimulatedSource;
 use crate::source::{LineState, Source};
+use crate::stop::StopProgress;
 use crate::texts::Language;
 use crate::words;
 
@@ -33,6 +35,8 @@ const LONGEST_FRAME_MS: f64 = 100.0;
 const STEP_MS: f64 = 20.0;
 /// How long the simulation may compute in each frame, in milliseconds, so that 30 pictures a second remain.
 const FRAME_BUDGET_MS: f64 = 24.0;
+/// A stop of a simulated arm gets this many steps at once: it holds after some, or something is wrong with it.
+const STEPS_OF_STOP: u32 = 50;
 /// How long plots reach back, in seconds.
 const PLOT_SECONDS: f64 = 10.0;
 
@@ -82,6 +86,10 @@ pub(super) struct App {
     pub(super) programs: Programs,
     pub(super) exercises: Exercises,
     pub(super) tour_step: usize,
+    /// `None` outside a class.
+    pub(super) class: Option<ClassTab>,
+    /// The simulated arm, while the page drives the class's real one.
+    pub(super) set_aside: Option<(Line, Client)>,
 }
 
 thread_local! {
@@ -139,7 +147,7 @@ fn plot_context(dom: &Dom) -> Result<CanvasRenderingContext2d, JsValue> {
 }
 
 /// The browser's clock, in milliseconds.
-fn browser_now() -> f64 {
+pub(super) fn browser_now() -> f64 {
     web_sys::window().and_then(|window| window.performance()).map_or(0.0, |clock| clock.now())
 }
 
@@ -184,6 +192,8 @@ impl App {
             programs: Programs::default(),
             exercises: Exercises::default(),
             tour_step: 0,
+            class: None,
+            set_aside: None,
         })
     }
 
@@ -211,8 +221,22 @@ impl App {
                 break;
             }
         }
+        self.class_on(time);
         self.show();
         self.frames = self.frames.wrapping_add(1);
+    }
+
+    /// Lets a stop of the arm take effect now, whenever the next picture comes: sends it, and lets a simulated arm move on until it
+    /// holds, also one whose time stands still.
+    pub(super) fn carry_out_stop(&mut self) {
+        let until = browser_now() + FRAME_BUDGET_MS;
+        for _ in 0..STEPS_OF_STOP {
+            self.exchange(STEP_MS, until);
+            let is_simulated = matches!(self.line, Line::Simulated(_));
+            if !is_simulated || self.client.stop_progress() != StopProgress::Verifying {
+                return;
+            }
+        }
     }
 
     /// Sends what is due, lets virtual time pass, and takes what the arm has sent.
@@ -271,7 +295,12 @@ impl App {
 
     /// Changes to another arm: everything that belonged to the last one ends.
     pub(super) fn set_line(&mut self, line: Line) {
-        (self.line, self.client) = (line, Client::default());
+        drop(self.swap_line((line, Client::default())));
+    }
+
+    /// As [`Self::set_line`], with what is known of the arm. Returns the last one.
+    pub(super) fn swap_line(&mut self, line: (Line, Client)) -> (Line, Client) {
+        let before = (std::mem::replace(&mut self.line, line.0), std::mem::replace(&mut self.client, line.1));
         (self.shown_round, self.slid_round) = (0, 0);
         (self.hand, self.unreachable) = (None, None);
         (self.recorder, self.player, self.park) = (None, None, None);
@@ -281,6 +310,7 @@ impl App {
         let is_simulated = matches!(self.line, Line::Simulated(_));
         self.dom.set_hidden("simulator", !is_simulated);
         self.dom.end_notice();
+        before
     }
 
     pub(super) fn line_state(&mut self) -> LineState {

@@ -30,10 +30,16 @@ impl SocketSource {
     /// # Errors
     /// The browser refuses the address.
     pub fn connect() -> Result<Self, JsValue> {
-        let location = web_sys::window().ok_or("no window")?.location();
-        let scheme = if location.protocol()? == "https:" { "wss" } else { "ws" };
-        let address = format!("{scheme}://{}/frames{}", location.host()?, location.search()?);
-        let socket = WebSocket::new(&address)?;
+        let query = web_sys::window().ok_or("no window")?.location().search()?;
+        Self::connect_with(&query)
+    }
+
+    /// Connects to the server that this page came from, with a query such as `?token=TOKEN`.
+    ///
+    /// # Errors
+    /// The browser refuses the address.
+    pub fn connect_with(query: &str) -> Result<Self, JsValue> {
+        let socket = WebSocket::new(&address("frames", query)?)?;
         socket.set_binary_type(BinaryType::Arraybuffer);
         let shared = Rc::new(RefCell::new(Shared::default()));
         let inbox = Rc::clone(&shared);
@@ -50,6 +56,16 @@ impl SocketSource {
         socket.set_onclose(Some(close.as_ref().unchecked_ref()));
         Ok(Self { socket, shared, _message: message, _close: close })
     }
+}
+
+/// The address of a WebSocket of the server that this page came from.
+///
+/// # Errors
+/// The page has no address.
+pub fn address(path: &str, query: &str) -> Result<String, JsValue> {
+    let location = web_sys::window().ok_or("no window")?.location();
+    let scheme = if location.protocol()? == "https:" { "wss" } else { "ws" };
+    Ok(format!("{scheme}://{}/{path}{query}", location.host()?))
 }
 
 impl Drop for SocketSource {

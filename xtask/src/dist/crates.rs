@@ -7,7 +7,7 @@ use super::sources;
 use crate::run::{TaskResult, run_command, target_directory};
 
 /// The libraries. A registry gets those first on which others stand.
-const LIBRARIES: [&str; 10] = [
+const LIBRARIES: [&str; 11] = [
     "kinematics",
     "protocol-core",
     "motion-core",
@@ -17,6 +17,7 @@ const LIBRARIES: [&str; 10] = [
     "tty-ports",
     "sevenbot",
     "recording-formats",
+    "classroom",
     "sevenbot-serve",
 ];
 

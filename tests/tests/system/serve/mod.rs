@@ -1,8 +1,10 @@
-//! `sevenbot serve` and `sevenbot view`: one arm for many programs.
+//! `sevenbot serve`, `sevenbot view` and `sevenbot class`: one arm for many programs.
 
 mod attacks;
 mod bad_web;
 mod chaos;
+mod class;
+mod class_tabs;
 mod descriptors;
 mod line_history;
 mod load;

@@ -1,5 +1,6 @@
 //! The page in real browsers: one program, which `cargo xtask test` runs by its name.
 
+mod class;
 mod controls;
 mod endurance;
 mod exercises;

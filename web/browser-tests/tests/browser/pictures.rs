@@ -4,7 +4,7 @@ use std::path::Path;
 
 use browser_tests::page::{DARK, DESKTOP, PHONE};
 use browser_tests::picture::{Picture, write_animation};
-use browser_tests::{Page, Viewed};
+use browser_tests::{ClassRun, Page, Viewed};
 
 fn keep(page: &mut Page, name: &str) {
     std::fs::write(folder().join(name), page.screenshot()).expect("a file");
@@ -56,4 +56,36 @@ fn write_the_animation() {
         }
     }
     write_animation(&folder().join("web.png"), &pictures, 6);
+}
+
+#[test]
+#[ignore = "writes docs/class-*.png"]
+fn write_the_pictures_of_a_class() {
+    let class = ClassRun::start(true);
+    let mut teacher = class.open_teacher();
+    let poses = [("Mia", 120), ("Leo", 60), ("Ida", 150), ("Lin", 90), ("Tom", 40), ("Zoe", 105)];
+    let mut pupils = poses.map(|(name, base)| {
+        let mut page = class.join(&teacher, name);
+        page.type_into("#target-1", &base.to_string());
+        page.type_into("#target-3", &(50 + base / 3).to_string());
+        page
+    });
+    pupils[1].choose("#fault-joint", "2");
+    pupils[1].choose("#fault-kind", "stuck");
+    pupils[1].click("[data-action=break]");
+    pupils[1].type_into("#target-2", "120");
+    pupils[2].click("[data-action=exercises]");
+    pupils[2].click("[data-action=begin-exercise]");
+    teacher.wait_for_text("#arm-state", "nobody has it");
+    teacher.click("#tiles li:first-child button");
+    pupils[0].wait_for_text("#notice", "The teacher gave you the class's real arm.");
+    pupils[0].wait_until_ready();
+    pupils[1].wait_for_text("#state", "oint 2");
+    teacher.type_into("#say", "Look at the real arm in front: Mia shows her program.");
+    teacher.wait_for_text("#said", "Look at the real arm");
+    teacher.wait_for_text("#tiles", "a joint is blocked");
+    keep(&mut teacher, "class-teacher.png");
+    pupils[0].wait_for_text("#class-text", "Look at the real arm");
+    pupils[0].evaluate("scrollTo(0, 0)");
+    keep(&mut pupils[0], "class-pupil.png");
 }

@@ -12,13 +12,13 @@ use system_tests::wait::wait_for;
 /// The state of the last block that is lit.
 const LIT: &str = "document.querySelector('.blocklyHighlighted')?.dataset.id ?? ''";
 /// Joint 1 turns for a minute.
-const SLOW: &str = r#"{"blocks": {"blocks": [{"type": "arm_start", "id": "start", "next": {"block":
+pub(crate) const SLOW: &str = r#"{"blocks": {"blocks": [{"type": "arm_start", "id": "start", "next": {"block":
     {"type": "arm_move_joint", "id": "turn", "fields": {"JOINT": "1"}, "inputs": {
     "ANGLE": {"block": {"type": "math_number", "fields": {"NUM": 180}}},
     "SPEED": {"block": {"type": "math_number", "fields": {"NUM": 2}}}}}}}]}}"#;
 
 /// Opens the programs, and waits until the editor is there.
-fn open_programs(page: &mut Page) {
+pub(crate) fn open_programs(page: &mut Page) {
     page.click("[data-action=programs]");
     wait_for("the editor is there", || {
         let blocks = page.evaluate("document.querySelectorAll('#blocks .blocklyDraggable').length");
@@ -34,7 +34,7 @@ fn programs(viewed: &Viewed) -> Page {
 }
 
 /// Opens a program, and waits until it is shown as Python with this part.
-fn open_file(page: &mut Page, file: &Path, part: &str) {
+pub(crate) fn open_file(page: &mut Page, file: &Path, part: &str) {
     page.choose_file("#open-program", &file.canonicalize().expect("a file"));
     wait_for(&format!("the program is shown as {part}"), || {
         let python = page.text("#python");

@@ -1,0 +1,54 @@
+//! A teacher's screen: what it has to be told.
+
+use protocol_core::time::{Duration, Instant};
+
+use crate::message::{NotGiven, ToTeacher};
+
+/// The class is shown at most this often while something happens,
+const PERIOD: Duration = Duration::from_millis(100);
+/// and this often otherwise: times run on.
+const LONGEST_PERIOD: Duration = Duration::from_millis(500);
+
+#[derive(Debug, Default)]
+pub(crate) struct Desk {
+    was_welcomed: bool,
+    not_given: Option<NotGiven>,
+    /// The number of the last change that was shown, and when.
+    shown: Option<(u64, Instant)>,
+}
+
+impl Desk {
+    /// The real arm was not given.
+    pub(crate) const fn refuse(&mut self, why: NotGiven) {
+        self.not_given = Some(why);
+    }
+
+    fn is_class_due(&self, now: Instant, change: u64) -> bool {
+        self.shown.is_none_or(|(shown, at)| now - at >= if shown == change { LONGEST_PERIOD } else { PERIOD })
+    }
+
+    /// Has it to be told something?
+    pub(crate) fn has_message(&self, now: Instant, change: u64) -> bool {
+        !self.was_welcomed || self.not_given.is_some() || self.is_class_due(now, change)
+    }
+
+    /// What it has to be told next. `change`: the number of the last change in the class.
+    pub(crate) fn next_message(
+        &mut self,
+        now: Instant,
+        change: u64,
+        welcome: impl FnOnce() -> ToTeacher,
+        class: impl FnOnce() -> ToTeacher,
+    ) -> Option<ToTeacher> {
+        if !std::mem::replace(&mut self.was_welcomed, true) {
+            return Some(welcome());
+        }
+        if let Some(why) = self.not_given.take() {
+            return Some(ToTeacher::NotGiven(why));
+        }
+        self.is_class_due(now, change).then(|| {
+            self.shown = Some((change, now));
+            class()
+        })
+    }
+}

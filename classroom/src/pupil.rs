@@ -1,0 +1,153 @@
+//! A pupil: the tab that is connected or was, what it said last, and what it has to be told.
+
+use protocol_core::time::{Duration, Instant};
+
+use crate::connection::ConnectionId;
+use crate::message::{LeaseEnd, LentArm, Presence, Report, StopOutcome, Tile, ToPupil};
+use crate::stop_all::PendingStop;
+
+/// Time between two questions to a tab that answers.
+const ASK_PERIOD: Duration = Duration::from_millis(250);
+/// A tab that has not answered for this long counts as silent. Then it is asked again.
+const SILENT: Duration = Duration::from_millis(8_000);
+
+#[derive(Debug)]
+pub(crate) struct Pupil {
+    pub(crate) name: String,
+    pub(crate) key: String,
+    /// `None`: the connection was lost at `lost`.
+    pub(crate) connection: Option<ConnectionId>,
+    lost: Instant,
+    is_welcome_due: bool,
+    report: Option<Report>,
+    /// When it was asked last, and when it answered last.
+    asked: Instant,
+    answered: Instant,
+    is_ask_due: bool,
+    waits_for_answer: bool,
+    /// It had the real arm, and was not told yet why no longer.
+    over: Option<LeaseEnd>,
+    pub(crate) stop: Option<PendingStop>,
+    /// The number of the last message of the teacher that it got.
+    message_seen: u32,
+}
+
+impl Pupil {
+    pub(crate) const fn new(now: Instant, name: String, key: String, connection: ConnectionId) -> Self {
+        Self {
+            name,
+            key,
+            connection: Some(connection),
+            lost: now,
+            is_welcome_due: true,
+            report: None,
+            asked: now,
+            answered: now,
+            is_ask_due: true,
+            waits_for_answer: false,
+            over: None,
+            stop: None,
+            message_seen: 0,
+        }
+    }
+
+    /// The same pupil in a new connection. Returns the one before, if it is still open.
+    pub(crate) fn rejoin(
+        &mut self,
+        now: Instant,
+        name: String,
+        connection: ConnectionId,
+    ) -> Option<ConnectionId> {
+        let before = self.connection.replace(connection);
+        self.name = name;
+        (self.is_welcome_due, self.is_ask_due, self.waits_for_answer) = (true, true, false);
+        (self.answered, self.message_seen) = (now, 0);
+        if let Some(stop) = &mut self.stop {
+            stop.send_again(now);
+        }
+        before
+    }
+
+    /// The connection has ended.
+    pub(crate) const fn lose(&mut self, now: Instant) {
+        (self.connection, self.lost) = (None, now);
+    }
+
+    /// For how long has it been gone? `None` if it is connected.
+    pub(crate) fn lost_for(&self, now: Instant) -> Option<Duration> {
+        self.connection.is_none().then(|| now - self.lost)
+    }
+
+    pub(crate) fn presence(&self, now: Instant) -> Presence {
+        match self.connection {
+            None => Presence::Lost,
+            Some(_) if now - self.answered >= SILENT => Presence::Silent,
+            Some(_) => Presence::Here,
+        }
+    }
+
+    /// It is to be asked, and told who has the real arm, at once.
+    pub(crate) const fn ask(&mut self) {
+        self.is_ask_due = true;
+    }
+
+    /// It has the real arm no longer.
+    pub(crate) const fn end_lease(&mut self, why: LeaseEnd) {
+        self.over = Some(why);
+    }
+
+    pub(crate) fn take_report(&mut self, now: Instant, report: Report) {
+        (self.report, self.answered, self.waits_for_answer) = (Some(report), now, false);
+    }
+
+    pub(crate) fn confirm_stop(&mut self, number: u32, outcome: StopOutcome) -> bool {
+        self.stop.as_mut().is_some_and(|stop| stop.confirm(number, outcome))
+    }
+
+    /// Time passes.
+    pub(crate) fn poll(&mut self, now: Instant) {
+        let since = now - self.asked;
+        self.is_ask_due |= since >= if self.waits_for_answer { SILENT } else { ASK_PERIOD };
+    }
+
+    /// Has it to be told something? `message`: the number of the teacher's last message.
+    pub(crate) fn has_message(&self, now: Instant, message: u32) -> bool {
+        let is_stop_due = self.stop.is_some_and(|stop| stop.is_due(now));
+        is_stop_due || self.is_welcome_due || self.message_seen != message || self.is_ask_due
+    }
+
+    /// What it has to be told next: a stop before everything else.
+    pub(crate) fn next_message(
+        &mut self,
+        now: Instant,
+        (number, text): (u32, &str),
+        arm: impl FnOnce() -> Option<LentArm>,
+    ) -> Option<ToPupil> {
+        if let Some(stop) = self.stop.as_mut().filter(|stop| stop.is_due(now)) {
+            stop.sent(now);
+            return Some(ToPupil::Stop { number: stop.number });
+        }
+        if std::mem::take(&mut self.is_welcome_due) {
+            return Some(ToPupil::Welcome { name: self.name.clone(), key: self.key.clone() });
+        }
+        if self.message_seen != number {
+            self.message_seen = number;
+            return Some(ToPupil::Message { text: text.to_owned() });
+        }
+        std::mem::take(&mut self.is_ask_due).then(|| {
+            (self.asked, self.waits_for_answer) = (now, true);
+            ToPupil::Ask { arm: arm(), over: self.over.take() }
+        })
+    }
+
+    pub(crate) fn tile(&self, now: Instant, pupil: u32, stop: Option<u32>) -> Tile {
+        let pending = self.stop.filter(|pending| Some(pending.number) == stop);
+        Tile {
+            pupil,
+            name: self.name.clone(),
+            presence: self.presence(now),
+            report: self.report.clone(),
+            stop: pending.map(|pending| pending.tile()),
+        }
+    }
+}

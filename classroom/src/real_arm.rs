@@ -1,0 +1,98 @@
+//! The class's real arm: who has it, and whether it holds where it has to.
+
+use protocol_core::time::Instant;
+
+use crate::lease::Lease;
+use crate::message::{ArmTile, NotGiven, StopOutcome, TileStop};
+use crate::stop_all::PendingStop;
+
+/// What the real arm does.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ArmNews {
+    /// It answers.
+    pub answers: bool,
+    /// It is being held.
+    pub is_holding: bool,
+    /// It has confirmed the last hold.
+    pub holds: bool,
+}
+
+/// The real arm of a class.
+#[derive(Debug, Default)]
+pub(crate) struct RealArm {
+    news: ArmNews,
+    hold: Option<PendingStop>,
+    /// What it says of the last stop for all.
+    pub(crate) stop: Option<TileStop>,
+    lease: Option<Lease>,
+    leases: u32,
+}
+
+impl RealArm {
+    /// It has to hold where it is.
+    pub(crate) const fn hold(&mut self, now: Instant) {
+        self.hold = Some(PendingStop::new(0, now));
+    }
+
+    /// It has to hold because all stop.
+    pub(crate) const fn stop(&mut self, now: Instant) {
+        self.stop = Some(TileStop::Asked);
+        self.hold(now);
+    }
+
+    /// A lease from now on.
+    pub(crate) fn new_lease(&mut self, now: Instant, pupil: u32, seconds: u32) -> Result<Lease, NotGiven> {
+        let lease = Lease::new(self.leases + 1, pupil, now, seconds).ok_or(NotGiven::BadTime)?;
+        self.leases += 1;
+        if self.news.answers { Ok(lease) } else { Err(NotGiven::ArmSilent) }
+    }
+
+    pub(crate) const fn lend(&mut self, lease: Lease) {
+        self.lease = Some(lease);
+    }
+
+    pub(crate) const fn lease(&self) -> Option<Lease> {
+        self.lease
+    }
+
+    /// Nobody has it from now on, and it has to hold. Returns who had it.
+    pub(crate) fn take_back(&mut self, now: Instant) -> Option<u32> {
+        let lease = self.lease.take()?;
+        self.hold(now);
+        Some(lease.pupil)
+    }
+
+    /// Has it to be held now? It is, from then on.
+    pub(crate) fn take_hold(&mut self, now: Instant) -> bool {
+        let is_free = self.news.answers && !self.news.is_holding;
+        let Some(hold) = self.hold.as_mut().filter(|hold| is_free && hold.is_due(now)) else { return false };
+        hold.sent(now);
+        self.news = ArmNews { is_holding: true, holds: false, ..self.news };
+        true
+    }
+
+    /// Returns whether there is something new, and whether it confirms the stop for all.
+    pub(crate) fn take_news(&mut self, now: Instant, news: ArmNews) -> (bool, bool) {
+        let is_new = self.news != news;
+        self.news = news;
+        // What came before the hold was sent says nothing of it.
+        let was_sent = self.hold.is_some_and(|hold| !hold.is_due(now));
+        let confirmed = is_new && news.holds && was_sent;
+        if !confirmed {
+            return (is_new, false);
+        }
+        if let Some(hold) = &mut self.hold {
+            hold.confirm(0, StopOutcome::Holds);
+        }
+        (is_new, self.stop.replace(TileStop::Holds) == Some(TileStop::Asked))
+    }
+
+    pub(crate) fn tile(&self, now: Instant) -> ArmTile {
+        ArmTile {
+            answers: self.news.answers,
+            stop: self.hold.map(|hold| hold.tile()),
+            holder: self.lease.map(|lease| lease.pupil),
+            seconds: self.lease.map_or(0, |lease| lease.seconds(now)),
+        }
+    }
+}

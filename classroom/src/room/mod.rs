@@ -1,0 +1,240 @@
+//! The class: events in, messages out.
+//!
+//! ```text
+//!   connections, time ──▶ mod.rs ──▶ orders.rs: what pupils and the teacher want
+//!                            └─────▶ outgoing.rs: what each has to be told next
+//! ```
+
+mod orders;
+mod outgoing;
+
+use std::collections::BTreeMap;
+
+use protocol_core::time::{Duration, Instant};
+
+use crate::connection::ConnectionId;
+use crate::desk::Desk;
+use crate::message::{FromPupil, LeaseEnd, Presence, Refusal};
+use crate::name;
+use crate::pupil::Pupil;
+use crate::real_arm::{ArmNews, RealArm};
+use crate::stop_all::StopAll;
+
+/// Pupils in a class, with those whose connection was lost.
+pub const MOST_PUPILS: usize = 64;
+/// Teacher's screens: the one on the desk, and that of the beamer.
+const MOST_TEACHERS: usize = 4;
+/// A pupil whose connection was lost is shown for this long, and has its name for this long.
+const LOST_KEPT: Duration = Duration::from_millis(120_000);
+
+/// What a class is told at its start.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct ClassInfo {
+    /// The addresses that pupils open, for the teacher's screen.
+    pub addresses: Vec<String>,
+    /// What they have to type, for the teacher's screen. The server checks it.
+    pub code: Option<String>,
+    /// The class has a real arm.
+    pub has_arm: bool,
+}
+
+/// The right of a pupil to the real arm. A later lease is another one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LeaseId(u32);
+
+#[derive(Debug)]
+enum Connection {
+    /// It has not said who it is. If it becomes a pupil, this is its key.
+    Stranger(String),
+    Pupil(u32),
+    Teacher(Desk),
+    /// It is told why, and then closed.
+    Refused(Option<Refused>),
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Refused {
+    Pupil(Refusal),
+    Teacher,
+}
+
+/// A class.
+#[derive(Debug)]
+pub struct Classroom {
+    info: ClassInfo,
+    pupils: BTreeMap<u32, Pupil>,
+    next_pupil: u32,
+    connections: BTreeMap<ConnectionId, Connection>,
+    next_connection: u64,
+    arm: Option<RealArm>,
+    stop: Option<StopAll>,
+    /// The teacher's message, and how many there were.
+    message: (u32, String),
+    /// Changes so far, which teacher's screens have to show.
+    change: u64,
+}
+
+impl Classroom {
+    /// A class without pupils.
+    #[must_use]
+    pub fn new(info: ClassInfo) -> Self {
+        Self {
+            arm: info.has_arm.then(RealArm::default),
+            info,
+            pupils: BTreeMap::new(),
+            next_pupil: 1,
+            connections: BTreeMap::new(),
+            next_connection: 1,
+            stop: None,
+            message: (0, String::new()),
+            change: 0,
+        }
+    }
+
+    /// A tab of a pupil connects. `key` is a new secret: who knows it is this pupil.
+    pub fn open_pupil(&mut self, key: String) -> ConnectionId {
+        let pupils =
+            |connection: &&Connection| matches!(connection, Connection::Stranger(_) | Connection::Pupil(_));
+        let is_full = self.connections.values().filter(pupils).count() >= MOST_PUPILS;
+        let refused = Connection::Refused(Some(Refused::Pupil(Refusal::Full)));
+        self.open(if is_full { refused } else { Connection::Stranger(key) })
+    }
+
+    /// A teacher's screen connects.
+    pub fn open_teacher(&mut self) -> ConnectionId {
+        let teachers = |connection: &&Connection| matches!(connection, Connection::Teacher(_));
+        let is_full = self.connections.values().filter(teachers).count() >= MOST_TEACHERS;
+        let refused = Connection::Refused(Some(Refused::Teacher));
+        self.open(if is_full { refused } else { Connection::Teacher(Desk::default()) })
+    }
+
+    fn open(&mut self, connection: Connection) -> ConnectionId {
+        let id = ConnectionId::new(self.next_connection);
+        self.next_connection += 1;
+        self.connections.insert(id, connection);
+        id
+    }
+
+    /// A connection has ended.
+    pub fn close(&mut self, now: Instant, id: ConnectionId) {
+        let Some(Connection::Pupil(number)) = self.connections.remove(&id) else { return };
+        if let Some(pupil) = self.pupils.get_mut(&number) {
+            pupil.lose(now);
+        }
+        self.end_lease_of(now, number, LeaseEnd::Lost);
+        self.change += 1;
+    }
+
+    /// A message came. One that is none ends the connection.
+    pub fn receive(&mut self, now: Instant, id: ConnectionId, text: &str) {
+        let Some(connection) = self.connections.get(&id) else { return };
+        let is_taken = match connection {
+            Connection::Stranger(key) => match serde_json::from_str(text) {
+                Ok(FromPupil::Join { name, key: known }) => {
+                    let key = key.clone();
+                    self.join(now, id, &name, key, known.as_deref());
+                    true
+                }
+                _ => false,
+            },
+            &Connection::Pupil(number) => {
+                serde_json::from_str(text).is_ok_and(|message| self.hear_pupil(now, number, message))
+            }
+            Connection::Teacher(_) => {
+                serde_json::from_str(text).map(|message| self.hear_teacher(now, id, message)).is_ok()
+            }
+            Connection::Refused(_) => true,
+        };
+        if !is_taken {
+            self.refuse(now, id, Refusal::BadMessage);
+        }
+        self.change += 1;
+    }
+
+    /// Ends a connection with a reason.
+    fn refuse(&mut self, now: Instant, id: ConnectionId, why: Refusal) {
+        self.close(now, id);
+        self.connections.insert(id, Connection::Refused(Some(Refused::Pupil(why))));
+    }
+
+    fn join(&mut self, now: Instant, id: ConnectionId, wanted: &str, key: String, known: Option<&str>) {
+        let Some(name) = name::clean(wanted) else { return self.refuse(now, id, Refusal::NoName) };
+        let before = self.pupils.iter().find(|(_, pupil)| Some(pupil.key.as_str()) == known);
+        let before = before.map(|(&number, _)| number);
+        let others = || self.pupils.iter().filter(|(number, _)| Some(**number) != before);
+        let is_taken = |wanted: &str| others().any(|(_, other)| name::is_same(&other.name, wanted));
+        let name = name::unique(&name, is_taken);
+        let Some(number) = before.or_else(|| self.free_number(now)) else {
+            return self.refuse(now, id, Refusal::Full);
+        };
+        let old = match self.pupils.get_mut(&number) {
+            Some(pupil) => pupil.rejoin(now, name, id),
+            None => {
+                self.pupils.insert(number, Pupil::new(now, name, key, id));
+                None
+            }
+        };
+        self.connections.insert(id, Connection::Pupil(number));
+        if let Some(old) = old {
+            self.connections.insert(old, Connection::Refused(Some(Refused::Pupil(Refusal::OtherTab))));
+        }
+        self.end_lease_of(now, number, LeaseEnd::Lost);
+    }
+
+    /// A number for a new pupil. Who is gone for the longest time makes room.
+    fn free_number(&mut self, now: Instant) -> Option<u32> {
+        if self.pupils.len() >= MOST_PUPILS {
+            let lost = self.pupils.iter().filter_map(|(&number, pupil)| Some((pupil.lost_for(now)?, number)));
+            let (_, number) = lost.max()?;
+            self.pupils.remove(&number);
+        }
+        let number = self.next_pupil;
+        self.next_pupil += 1;
+        Some(number)
+    }
+
+    /// Time passes. Call it each 50 ms or so.
+    pub fn poll(&mut self, now: Instant) {
+        self.pupils.values_mut().for_each(|pupil| pupil.poll(now));
+        let Some(lease) = self.lease_now() else { return self.forget_lost(now) };
+        let holder = self.pupils.get(&lease.pupil);
+        if lease.is_over(now) {
+            self.end_lease(now, LeaseEnd::Time);
+        } else if holder.is_none_or(|pupil| pupil.presence(now) != Presence::Here) {
+            self.end_lease(now, LeaseEnd::Lost);
+        }
+        self.forget_lost(now);
+    }
+
+    fn forget_lost(&mut self, now: Instant) {
+        let is_kept = |_: &u32, pupil: &mut Pupil| pupil.lost_for(now).is_none_or(|lost| lost < LOST_KEPT);
+        self.pupils.retain(is_kept);
+    }
+
+    /// The real arm has news.
+    pub fn arm_news(&mut self, now: Instant, news: ArmNews) {
+        let Some(arm) = &mut self.arm else { return };
+        let (is_new, confirms_stop) = arm.take_news(now, news);
+        if confirms_stop {
+            self.stop.iter_mut().for_each(|stop| stop.note_confirmed(now));
+        }
+        self.change += u64::from(is_new);
+    }
+
+    /// Has the real arm to be held now? The caller then starts to hold it, before it passes [`ArmNews`] again.
+    pub fn take_hold(&mut self, now: Instant) -> bool {
+        self.arm.as_mut().is_some_and(|arm| arm.take_hold(now))
+    }
+
+    /// The present lease of the real arm.
+    #[must_use]
+    pub fn lease(&self) -> Option<LeaseId> {
+        self.lease_now().map(|lease| LeaseId(lease.number))
+    }
+
+    /// The key of the pupil who has the real arm.
+    #[must_use]
+    pub fn holder_key(&self) -> Option<&str> {
+        self.pupils.get(&self.lease_now()?.pupil).map(|pupil| pupil.key.as_str())
+    }
+}

@@ -1,0 +1,50 @@
+//! Secrets that nobody can guess.
+
+use crate::command_error::CommandError;
+
+/// Letters and digits of a class code: none looks like another one on a board.
+const CODE_LETTERS: &[u8; 32] = b"abcdefghijkmnpqrstuvwxyz23456789";
+/// The length of a class code: 30 bits, and after a wrong one the server makes who tries wait.
+const CODE_LENGTH: usize = 6;
+
+fn random<const N: usize>() -> Option<[u8; N]> {
+    let mut bytes = [0; N];
+    getrandom::fill(&mut bytes).ok().map(|()| bytes)
+}
+
+/// 128 random bits; `None` if the operating system has no random numbers.
+pub(crate) fn key() -> Option<String> {
+    let bytes: [u8; 16] = random()?;
+    Some(bytes.iter().map(|byte| format!("{byte:02x}")).collect())
+}
+
+/// 128 random bits.
+pub(crate) fn new_secret() -> Result<String, CommandError> {
+    key().ok_or_else(no_random_numbers)
+}
+
+/// A code that pupils type.
+pub(crate) fn new_class_code() -> Result<String, CommandError> {
+    let bytes: [u8; CODE_LENGTH] = random().ok_or_else(no_random_numbers)?;
+    let letter = |byte: u8| CODE_LETTERS.get(usize::from(byte % 32)).copied().map(char::from);
+    Ok(bytes.into_iter().filter_map(letter).collect())
+}
+
+fn no_random_numbers() -> CommandError {
+    CommandError::Arm("the operating system has no random numbers".to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_secret_is_another_one() {
+        let secrets = [new_secret(), new_secret()].map(|secret| secret.expect("a secret"));
+        assert!(secrets.iter().all(|secret| secret.len() == 32));
+        assert_ne!(secrets[0], secrets[1]);
+        let codes = [new_class_code(), new_class_code()].map(|code| code.expect("a code"));
+        assert!(codes.iter().all(|code| code.len() == CODE_LENGTH && code.is_ascii()));
+        assert_ne!(codes[0], codes[1]);
+    }
+}

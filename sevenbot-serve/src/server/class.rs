@@ -1,0 +1,114 @@
+//! The class, shared by the tasks of its connections, and its end of the real arm.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use classroom::{ArmNews, Classroom, ConnectionId, LeaseId};
+use host_link::sharing::Command;
+use protocol_core::registers::Map;
+use protocol_core::time::Instant;
+use tokio::sync::{Notify, watch};
+
+use super::shared::{Shared, lock};
+use crate::hub::{ClientId, WholeRequest};
+
+/// Time between two looks at the clock: a lease that is over ends so late at most.
+const TICK: Duration = Duration::from_millis(50);
+
+/// Who may exchange frames with the real arm: the newest session of the present lease.
+type Session = Option<(LeaseId, u64)>;
+
+/// A class, and who has to hear of its news.
+pub(super) struct Class {
+    shared: Arc<Shared>,
+    room: Mutex<Classroom>,
+    wakes: Mutex<BTreeMap<ConnectionId, Arc<Notify>>>,
+    /// The client of the hub that holds the arm.
+    client: ClientId,
+    session: watch::Sender<Session>,
+}
+
+impl Class {
+    pub(super) fn new(shared: Arc<Shared>, room: Classroom) -> Arc<Self> {
+        let client = shared.with_hub(|hub, _| hub.connect());
+        let (room, wakes) = (Mutex::new(room), Mutex::default());
+        Arc::new(Self { shared, room, wakes, client, session: watch::Sender::new(None) })
+    }
+
+    /// Lets time pass for ever.
+    pub(super) async fn run(self: Arc<Self>) {
+        loop {
+            self.with(Classroom::poll);
+            tokio::time::sleep(TICK).await;
+        }
+    }
+
+    /// Does something in the class, then what follows from it: the arm is held, a session ends, tasks wake up.
+    pub(super) fn with<T>(&self, work: impl FnOnce(&mut Classroom, Instant) -> T) -> T {
+        let mut room = lock(&self.room);
+        let now = self.shared.now();
+        let done = work(&mut room, now);
+        let lease = room.lease();
+        self.session.send_if_modified(|session| {
+            let is_over = session.is_some_and(|(of, _)| Some(of) != lease);
+            if is_over {
+                *session = None;
+            }
+            is_over
+        });
+        self.serve_arm(&mut room, now);
+        let wakes = lock(&self.wakes);
+        room.ready(now).filter_map(|id| wakes.get(&id)).for_each(|wake| wake.notify_one());
+        done
+    }
+
+    fn serve_arm(&self, room: &mut Classroom, now: Instant) {
+        if room.take_hold(now) {
+            let (address, values) = Command::Stop.write();
+            let stop = WholeRequest::Write { map: Map::V22, address, values: values.to_vec() };
+            self.shared.with_client(|hub, now| hub.request(now, self.client, now, stop));
+        }
+        let news = self.shared.with_hub(|hub, _| ArmNews {
+            answers: hub.has_arm(),
+            is_holding: hub.is_holding(),
+            holds: hub.has_held(),
+        });
+        room.arm_news(now, news);
+    }
+
+    /// A new connection wakes up by this when there is a message for it.
+    pub(super) fn join(&self, id: ConnectionId) -> Arc<Notify> {
+        let wake = Arc::new(Notify::new());
+        lock(&self.wakes).insert(id, Arc::clone(&wake));
+        wake
+    }
+
+    pub(super) fn part(&self, id: ConnectionId) {
+        lock(&self.wakes).remove(&id);
+        self.with(|room, now| room.close(now, id));
+    }
+
+    /// The present lease, if its pupil has this key.
+    pub(super) fn lease_with(&self, is_key: impl FnOnce(&str) -> bool) -> Option<LeaseId> {
+        let room = lock(&self.room);
+        room.holder_key().filter(|key| is_key(key)).and(room.lease())
+    }
+
+    /// Serves the arm to a pupil as long as the lease lasts. A newer session of the same lease ends it, too.
+    pub(super) async fn while_lent(&self, lease: LeaseId, serve: impl Future<Output = ()>) {
+        let mut watched = self.session.subscribe();
+        let number = self.session.borrow().map_or(0, |(_, number)| number) + 1;
+        let own = Some((lease, number));
+        if lock(&self.room).lease() != Some(lease) {
+            return;
+        }
+        self.session.send_replace(own);
+        tokio::select! {
+            // The end of the lease comes first: nothing that arrives after it reaches the arm.
+            biased;
+            _ = watched.wait_for(|session| *session != own) => {}
+            () = serve => {}
+        }
+    }
+}

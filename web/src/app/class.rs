@@ -1,0 +1,265 @@
+//! A pupil's tab in a class: joins it, tells it how the arm does, stops with all others, and drives the real arm while it has it.
+
+use classroom::message::Refusal;
+use classroom::{Goals, LeaseEnd, LentArm, ToPupil};
+use web_sys::HtmlInputElement;
+
+use super::class_socket::ClassSocket;
+use super::class_tab::ClassTab;
+use super::editor::Editor;
+use super::page::{App, Line, browser_now, with_app};
+use super::storage;
+use crate::class::{Activity, Membership, report, stop_of_the_real_arm};
+use crate::client::Client;
+use crate::program::ProgramRun;
+use crate::source::socket::SocketSource;
+
+/// Time between two attempts to connect again, in milliseconds.
+const RETRY_MS: f64 = 2_000.0;
+/// How the query of an address begins that leads to a class.
+const QUERY: &str = "?class";
+
+impl App {
+    /// Joins the class of the address, if it has one.
+    pub(super) fn open_class(&mut self) {
+        let query = web_sys::window().and_then(|window| window.location().search().ok());
+        let Some(query) = query.filter(|query| query.starts_with(QUERY)) else { return };
+        let code = query.strip_prefix("?class=").map(str::to_owned);
+        let kept = |name| storage::load_of_tab(name).unwrap_or_default();
+        let code = code.unwrap_or_else(|| kept("class-code"));
+        self.dom.set_hidden("class", false);
+        self.class = Some(ClassTab::default());
+        for (id, value) in [("class-code", &code), ("class-name", &kept("class-name"))] {
+            if let Ok(field) = self.dom.get::<HtmlInputElement>(id) {
+                field.set_value(value);
+            }
+        }
+        if storage::load_of_tab("class-key").is_some() {
+            self.join_class();
+        }
+    }
+
+    /// Does what a button asks for. Returns whether it is one of the class.
+    pub(super) fn act_on_class(&mut self, action: &str) -> bool {
+        match action {
+            "join-class" => self.join_class(),
+            "rename" => self.leave_class(),
+            "close-class-text" => self.dom.set_hidden("class-text-row", true),
+            "stop-class-arm" => self.class.iter().for_each(|class| class.send(&stop_of_the_real_arm())),
+            _ => return false,
+        }
+        true
+    }
+
+    fn field(&self, id: &str) -> String {
+        let field = self.dom.get::<HtmlInputElement>(id).map(|field| field.value());
+        field.unwrap_or_default().trim().to_owned()
+    }
+
+    fn join_class(&mut self) {
+        let (name, code) = (self.field("class-name"), self.field("class-code").to_ascii_lowercase());
+        let Some(class) = &mut self.class else { return };
+        for (id, value) in [("class-name", &name), ("class-code", &code)] {
+            storage::save_of_tab(id, value);
+        }
+        class.member = Some(Membership::new(name, storage::load_of_tab("class-key")));
+        class.code = code;
+        class.retry = Some(0.0);
+        self.dom.end_notice();
+        self.show_membership("class-joining");
+    }
+
+    /// Shows the fields for the name again.
+    fn leave_class(&mut self) {
+        self.end_real_arm(None);
+        if let Some(class) = &mut self.class {
+            (class.member, class.socket, class.retry, class.arm) = (None, None, None, None);
+        }
+        self.dom.set_hidden("class-join", false);
+        self.dom.set_hidden("class-there", true);
+    }
+
+    fn show_membership(&self, text: &'static str) {
+        let name = self.class.as_ref().map_or("", |class| class.name.as_str());
+        let name = if text == "class-you-are" { format!(" {name}") } else { String::new() };
+        self.dom.set_text("class-state", &format!("{}{name}", self.language.text(text)));
+        self.dom.set_hidden("class-join", true);
+        self.dom.set_hidden("class-there", false);
+    }
+
+    /// With each picture: connects again, and says that the arm has stopped.
+    pub(super) fn class_on(&mut self, time: f64) {
+        let Some(class) = &mut self.class else { return };
+        if class.socket.as_ref().is_some_and(ClassSocket::is_closed) {
+            class.socket = None;
+            self.class_ended(time);
+        }
+        let Some(class) = &mut self.class else { return };
+        if class.retry.is_some_and(|retry| retry <= time) {
+            class.retry = None;
+            class.socket = ClassSocket::connect(
+                &class.code,
+                || {
+                    with_app(|app| app.greet_class());
+                },
+                |text| {
+                    with_app(|app| app.hear_class(&text));
+                },
+            )
+            .ok();
+        }
+        self.confirm_stop();
+    }
+
+    fn class_ended(&mut self, time: f64) {
+        let Some(class) = &mut self.class else { return };
+        let Some(member) = &class.member else { return };
+        if !member.is_welcome() {
+            self.leave_class();
+            return self.dom.notice(self.language.text("class-not-joined"));
+        }
+        class.retry = Some(time + RETRY_MS);
+        self.end_real_arm(Some("arm-over-lost"));
+        self.show_membership("class-lost");
+    }
+
+    fn greet_class(&self) {
+        let Some(class) = &self.class else { return };
+        class.member.iter().for_each(|member| class.send(&member.hello()));
+    }
+
+    /// A message came.
+    fn hear_class(&mut self, text: &str) {
+        let member = self.class.as_mut().and_then(|class| class.member.as_mut());
+        match member.and_then(|member| member.receive(text)) {
+            None => {}
+            Some(ToPupil::Stop { .. }) => self.stop_for_teacher(),
+            Some(ToPupil::Welcome { name, key }) => self.be_welcome(name, &key),
+            Some(ToPupil::Refused(why)) => self.be_refused(why),
+            Some(ToPupil::Message { text }) => {
+                self.dom.set_text("class-text", &text);
+                self.dom.set_hidden("class-text-row", text.is_empty());
+            }
+            Some(ToPupil::Ask { arm, over }) => {
+                self.show_real_arm(arm, over);
+                self.tell_class();
+            }
+        }
+        self.confirm_stop();
+    }
+
+    fn be_welcome(&mut self, name: String, key: &str) {
+        storage::save_of_tab("class-key", key);
+        let Some(class) = &mut self.class else { return };
+        let is_other_name = class.member.as_ref().is_some_and(|member| member.wanted() != name);
+        class.name = name;
+        if is_other_name {
+            self.dom.notice(&format!("{} {}", self.language.text("class-name-taken"), class.name));
+        }
+        self.show_membership("class-you-are");
+    }
+
+    fn be_refused(&mut self, why: Refusal) {
+        self.leave_class();
+        self.dom.notice(self.language.text(match why {
+            Refusal::NoName => "class-no-name",
+            Refusal::Full => "class-full",
+            Refusal::OtherTab => "class-other-tab",
+            Refusal::BadMessage => "class-not-joined",
+        }));
+    }
+
+    /// The teacher stops all: at once, and not with the next picture, which a tab in the background never draws.
+    fn stop_for_teacher(&mut self) {
+        let run = self.programs.run.as_ref();
+        let block = run.and_then(ProgramRun::block).map(ToString::to_string);
+        let was_program = run.is_some();
+        self.stop();
+        self.carry_out_stop();
+        let stopped = self.language.text("stopped-by-teacher");
+        if was_program {
+            let text = format!("{} {stopped}", self.language.text("program-failed"));
+            Editor.warn(block.as_deref(), &text);
+            self.dom.notice(&text);
+        } else {
+            self.dom.notice(stopped);
+        }
+    }
+
+    /// Tells the class that the arm has stopped, once it has.
+    fn confirm_stop(&mut self) {
+        let progress = self.client.stop_progress();
+        let Some(class) = &mut self.class else { return };
+        let confirmation = class.member.as_mut().and_then(|member| member.confirmation(progress));
+        confirmation.into_iter().for_each(|text| class.send(&text));
+    }
+
+    /// Tells the class how the arm does.
+    fn tell_class(&self) {
+        let activity = match (&self.programs.run, &self.player, &self.park) {
+            (Some(_), ..) => Activity::Program,
+            (_, Some(_), _) => Activity::Playing,
+            (.., Some(_)) => Activity::Parking,
+            _ => Activity::None,
+        };
+        let count = |number: usize| u8::try_from(number).unwrap_or(u8::MAX);
+        let goals = self.exercises.attempt.as_ref().map(|attempt| Goals {
+            reached: count(attempt.reached().filter(|&is_reached| is_reached).count()),
+            all: count(attempt.reached().count()),
+        });
+        let report = report(&self.client, activity, goals, self.dom.0.hidden());
+        self.class.iter().for_each(|class| class.send(&report));
+    }
+
+    /// The class tells who has the real arm.
+    fn show_real_arm(&mut self, arm: Option<LentArm>, over: Option<LeaseEnd>) {
+        let text = arm.as_ref().map_or(String::new(), |arm| {
+            let time = format!("{}:{:02}", arm.seconds / 60, arm.seconds % 60);
+            match arm.is_yours {
+                true => format!("{} {time}", self.language.text("arm-is-yours")),
+                false => format!("{} {} {time}", arm.holder, self.language.text("arm-is-of")),
+            }
+        });
+        self.dom.set_text("class-arm", &text);
+        self.dom.set_hidden("stop-class-arm", arm.is_none());
+        let Some(class) = &mut self.class else { return };
+        let is_own = |arm: &Option<LentArm>| arm.as_ref().is_some_and(|arm| arm.is_yours);
+        let (was_own, is_own) = (is_own(&class.arm), is_own(&arm));
+        class.arm = arm;
+        match (was_own, is_own, over) {
+            (false, true, _) => self.begin_real_arm(),
+            (true, false, over) => self.end_real_arm(Some(match over {
+                Some(LeaseEnd::Time) => "arm-over-time",
+                Some(LeaseEnd::Lost) => "arm-over-lost",
+                Some(LeaseEnd::TakenBack) | None => "arm-over-back",
+            })),
+            (false, false, Some(LeaseEnd::Lost)) => self.dom.notice(self.language.text("arm-over-lost")),
+            _ => {}
+        }
+    }
+
+    /// The page drives the real arm from now on. Its simulated arm stands still meanwhile.
+    fn begin_real_arm(&mut self) {
+        self.end_movement();
+        let Some(query) = self.class.as_ref().and_then(ClassTab::arm_query) else { return };
+        let Ok(source) = SocketSource::connect_with(&query) else { return };
+        let own = self.swap_line((Line::Remote(Box::new(source)), Client::default()));
+        self.set_aside = Some(own);
+        self.dom.choose("source", "server");
+        self.dom.notice(self.language.text("arm-begins"));
+    }
+
+    /// The page has its simulated arm again. `text`: why.
+    fn end_real_arm(&mut self, text: Option<&'static str>) {
+        self.dom.set_text("class-arm", "");
+        self.dom.set_hidden("stop-class-arm", true);
+        self.class.iter_mut().for_each(|class| class.arm = None);
+        let Some(own) = self.set_aside.take() else { return };
+        if matches!(self.line, Line::Remote(_)) {
+            self.swap_line(own);
+            self.last_frame = browser_now();
+        }
+        self.dom.choose("source", "simulator");
+        text.into_iter().for_each(|text| self.dom.notice(self.language.text(text)));
+    }
+}
