@@ -5,8 +5,9 @@ pub const LONGEST_NAME: usize = 24;
 
 /// Characters that are not shown, or that turn the direction of the text around them.
 const fn is_invisible(character: char) -> bool {
-    matches!(character, '\u{ad}' | '\u{61c}' | '\u{180e}' | '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}'
-        | '\u{2060}'..='\u{206f}' | '\u{feff}' | '\u{fff9}'..='\u{fffb}' | '\u{e0000}'..='\u{e007f}')
+    matches!(character, '\u{ad}' | '\u{34f}' | '\u{61c}' | '\u{115f}' | '\u{1160}' | '\u{180b}'..='\u{180f}'
+        | '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{2800}' | '\u{3164}'
+        | '\u{fe00}'..='\u{fe0f}' | '\u{feff}' | '\u{ffa0}' | '\u{fff9}'..='\u{fffb}' | '\u{e0000}'..='\u{e007f}')
 }
 
 /// The name in a text: one line without spaces at its ends, cut after [`LONGEST_NAME`] characters. `None` without any letter or digit.
@@ -15,7 +16,7 @@ const fn is_invisible(character: char) -> bool {
 /// use classroom::name::clean;
 ///
 /// assert_eq!(clean("  Mia \n Lee ").as_deref(), Some("Mia Lee"));
-/// assert_eq!(clean(" \u{202e} "), None);
+/// assert_eq!(clean(" \u{202e} \u{3164} "), None);
 /// ```
 #[must_use]
 pub fn clean(text: &str) -> Option<String> {

@@ -15,6 +15,8 @@ pub struct ArmNews {
     pub is_holding: bool,
     /// It has confirmed the last hold.
     pub holds: bool,
+    /// Its motors were off then.
+    pub is_limp: bool,
 }
 
 /// The real arm of a class.
@@ -64,27 +66,27 @@ impl RealArm {
 
     /// Has it to be held now? It is, from then on.
     pub(crate) fn take_hold(&mut self, now: Instant) -> bool {
-        let is_free = self.news.answers && !self.news.is_holding;
-        let Some(hold) = self.hold.as_mut().filter(|hold| is_free && hold.is_due(now)) else { return false };
+        let ArmNews { answers, is_holding, .. } = self.news;
+        // A new stop does not wait for the end of an older one.
+        let is_wanted =
+            |hold: &&mut PendingStop| answers && hold.is_due(now) && !(is_holding && hold.was_sent);
+        let Some(hold) = self.hold.as_mut().filter(is_wanted) else { return false };
         hold.sent(now);
         self.news = ArmNews { is_holding: true, holds: false, ..self.news };
         true
     }
 
     /// Returns whether there is something new, and whether it confirms the stop for all.
-    pub(crate) fn take_news(&mut self, now: Instant, news: ArmNews) -> (bool, bool) {
+    pub(crate) fn take_news(&mut self, news: ArmNews) -> (bool, bool) {
         let is_new = self.news != news;
         self.news = news;
         // What came before the hold was sent says nothing of it.
-        let was_sent = self.hold.is_some_and(|hold| !hold.is_due(now));
-        let confirmed = is_new && news.holds && was_sent;
-        if !confirmed {
+        let Some(hold) = self.hold.as_mut().filter(|hold| is_new && news.holds && hold.was_sent) else {
             return (is_new, false);
-        }
-        if let Some(hold) = &mut self.hold {
-            hold.confirm(0, StopOutcome::Holds);
-        }
-        (is_new, self.stop.replace(TileStop::Holds) == Some(TileStop::Asked))
+        };
+        let outcome = if news.is_limp { StopOutcome::Limp } else { StopOutcome::Holds };
+        hold.confirm(0, outcome);
+        (is_new, self.stop.replace(outcome.into()) == Some(TileStop::Asked))
     }
 
     pub(crate) fn tile(&self, now: Instant) -> ArmTile {

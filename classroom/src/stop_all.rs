@@ -13,12 +13,13 @@ pub(crate) struct PendingStop {
     pub(crate) number: u32,
     /// When it has to be sent.
     due: Instant,
+    pub(crate) was_sent: bool,
     outcome: Option<StopOutcome>,
 }
 
 impl PendingStop {
     pub(crate) const fn new(number: u32, now: Instant) -> Self {
-        Self { number, due: now, outcome: None }
+        Self { number, due: now, was_sent: false, outcome: None }
     }
 
     /// Has it to be sent now?
@@ -28,7 +29,7 @@ impl PendingStop {
 
     /// It was sent.
     pub(crate) fn sent(&mut self, now: Instant) {
-        self.due = now + REPEAT;
+        (self.due, self.was_sent) = (now + REPEAT, true);
     }
 
     /// A new connection has to be told at once.

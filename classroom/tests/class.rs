@@ -12,7 +12,7 @@ use protocol_core::time::{Duration, Instant};
 
 const REPORT: Report =
     Report { points: Some([[0, 200, 100]; POINTS]), doing: Doing::Ready, goals: None, is_hidden: false };
-const ANSWERS: ArmNews = ArmNews { answers: true, is_holding: false, holds: false };
+const ANSWERS: ArmNews = ArmNews { answers: true, is_holding: false, holds: false, is_limp: false };
 const HOLDS: ArmNews = ArmNews { holds: true, ..ANSWERS };
 
 /// A class, and its clock.
@@ -390,6 +390,39 @@ enum Deed {
     Hear(u8),
 }
 
+#[test]
+fn a_confirmation_that_takes_long_counts() {
+    let mut lesson = Lesson::with_arm();
+    lesson.order(&FromTeacher::StopAll);
+    assert!(lesson.class.take_hold(lesson.now));
+    lesson.class.arm_news(lesson.now, ArmNews { is_holding: true, ..ANSWERS });
+    lesson.pass(400);
+    assert!(!lesson.class.take_hold(lesson.now), "it is being held");
+    lesson.class.arm_news(lesson.now, HOLDS);
+    assert_eq!(lesson.shown().arm.unwrap().stop, Some(TileStop::Holds));
+    assert!(!lesson.class.take_hold(lesson.now));
+}
+
+#[test]
+fn a_new_stop_does_not_wait_for_the_hold_before() {
+    let mut lesson = Lesson::with_arm();
+    lesson.order(&FromTeacher::StopAll);
+    lesson.hold();
+    lesson.class.arm_news(lesson.now, ArmNews { is_holding: true, ..ANSWERS });
+    lesson.order(&FromTeacher::StopAll);
+    assert!(lesson.class.take_hold(lesson.now));
+    assert!(!lesson.class.take_hold(lesson.now), "once");
+}
+
+#[test]
+fn an_arm_without_power_in_its_motors_is_told() {
+    let mut lesson = Lesson::with_arm();
+    lesson.order(&FromTeacher::StopAll);
+    assert!(lesson.class.take_hold(lesson.now));
+    lesson.class.arm_news(lesson.now, ArmNews { is_limp: true, ..HOLDS });
+    assert_eq!(lesson.shown().arm.unwrap().stop, Some(TileStop::Limp));
+}
+
 fn deed() -> impl Strategy<Value = Deed> {
     let tab = 0_u8..8;
     prop_oneof![
@@ -443,7 +476,7 @@ proptest! {
                 }),
                 Deed::Order(order) => lesson.order(&order),
                 Deed::Arm(answers, is_holding, holds) => {
-                    lesson.class.arm_news(lesson.now, ArmNews { answers, is_holding, holds });
+                    lesson.class.arm_news(lesson.now, ArmNews { answers, is_holding, holds, is_limp: false });
                 }
                 Deed::Pass(millis) => lesson.pass(millis),
                 Deed::Hear(tab) => tabs[usize::from(tab)].into_iter().for_each(|id| drop(lesson.hear_all(id))),

@@ -117,8 +117,8 @@ class Client:
             self.spin(0.0)
             while (left := due - self.seconds()) > 0.0:
                 self.spin(min(left, 0.005))
+            due = self.seconds() + period
             act(index)
-            due = max(due + period, self.seconds())
 
 
 def seconds_of(message: Any) -> float:

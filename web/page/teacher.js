@@ -22,11 +22,12 @@ const TEXTS = {
   code: ["class code", "课堂代码"],
   connecting: ["Connecting to the class …", "正在连接课堂……"],
   "connection-lost": ["The connection to `sevenbot class` was lost. Trying again …", "与 `sevenbot class` 的连接已断开，正在重试……"],
+  "not-sent": ["NOT SENT: there is no connection to `sevenbot class`. Try again when it is back.", "未发送：与 `sevenbot class` 没有连接。连接恢复后请重试。"],
   "bad-address": ["Open the address that `sevenbot class` printed: this one has no secret.", "请打开 `sevenbot class` 显示的地址：此地址不含密钥。"],
   full: ["There are too many teacher's screens. Close one, and load this page again.", "教师屏幕过多。请关闭一个，然后重新加载。"],
   here: ["pupils are here", "名学生在线"],
   asked: ["Stopping: confirmed by", "正在停止：已确认"],
-  holds: ["Stopped: all arms hold", "已停止：全部机械臂保持不动"],
+  "last-stop": ["Last stop: confirmed by all arms", "上次停止：全部机械臂已确认"],
   of: ["of", "/"],
   after: ["after", "用时"],
   "not-confirmed": ["Not confirmed:", "未确认："],
@@ -42,6 +43,7 @@ const TEXTS = {
   "arm-silent": ["does not answer: check its power and its cable", "没有应答：请检查电源和连接线"],
   "arm-free": ["nobody has it", "无人控制"],
   "arm-held": ["holds", "保持不动"],
+  "arm-limp": ["its motors are off", "电机已关闭"],
   "arm-holding": ["is being held", "正在停住"],
   has: ["has it", "正在控制"],
   no_arm: ["The class has no real arm: start `sevenbot class` with --port.", "课堂没有真机：请用 --port 启动 `sevenbot class`。"],
@@ -65,6 +67,8 @@ const TEXTS = {
 };
 const BAD = ["no_arm", "stop_failed", "blocked", "problem"];
 const RETRY_MS = 1000;
+// The class tells news twice a second at least.
+const SILENCE_MS = 3000;
 
 const $ = id => document.getElementById(id);
 let language = (localStorage.getItem("language") ?? navigator.language).startsWith("zh") ? 1 : 0;
@@ -95,8 +99,30 @@ function takeSecret() {
 function connect(secret) {
   const scheme = location.protocol === "https:" ? "wss" : "ws";
   socket = new WebSocket(`${scheme}://${location.host}/teacher?token=${encodeURIComponent(secret)}`);
+  const own = socket;
   let isFull = false;
+  let isOver = false;
+  let silence;
+  const end = () => {
+    if (isOver) return;
+    isOver = true;
+    clearTimeout(silence);
+    own.close();
+    shown = undefined;
+    if (isFull) return;
+    setText($("state"), text(welcome ? "connection-lost" : "bad-address"));
+    $("state").className = "bad";
+    setTimeout(() => connect(secret), RETRY_MS);
+  };
+  const hear = () => {
+    clearTimeout(silence);
+    // A network that is gone closes nothing.
+    silence = setTimeout(end, SILENCE_MS);
+  };
+  socket.onopen = hear;
   socket.onmessage = event => {
+    if (isOver) return;
+    hear();
     const message = JSON.parse(event.data);
     if (message === "full") {
       isFull = true;
@@ -111,18 +137,12 @@ function connect(secret) {
       notice(text(message.not_given));
     }
   };
-  socket.onclose = () => {
-    shown = undefined;
-    if (isFull) return;
-    setText($("state"), text(welcome ? "connection-lost" : "bad-address"));
-    $("state").className = "bad";
-    setTimeout(() => connect(secret), RETRY_MS);
-  };
+  socket.onclose = end;
 }
 
 function send(message) {
   if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify(message));
-  else notice(text("connection-lost"));
+  else notice(text("not-sent"));
 }
 
 function show() {
@@ -154,8 +174,8 @@ function showState() {
     line = `${text("asked")} ${stop.confirmed} ${text("of")} ${stop.asked}. ${text("not-confirmed")} ${missing.join(", ")}`;
     mood = "bad";
   } else if (stop) {
-    line += ` ${text("holds")} (${stop.confirmed}), ${text("after")} ${stop.millis} ms.`;
-    mood = "good";
+    line += ` ${text("last-stop")} (${stop.confirmed}), ${text("after")} ${stop.millis} ms.`;
+    mood = stop.confirmed > 0 ? "good" : "";
   }
   setText($("state"), line);
   $("state").className = mood;
@@ -166,7 +186,7 @@ function showArm() {
   $("arm").hidden = !arm;
   if (!arm) return;
   const holder = shown.pupils.find(pupil => pupil.pupil === arm.holder);
-  const held = { asked: "arm-holding", holds: "arm-held", limp: "arm-held" }[arm.stop];
+  const held = { asked: "arm-holding", holds: "arm-held", limp: "arm-limp" }[arm.stop];
   const who = holder ? `${holder.name} ${text("has")}` : [text("arm-free"), held && text(held)].filter(Boolean).join(" · ");
   setText($("arm-state"), arm.answers ? who : text("arm-silent"));
   setText($("arm-time"), holder ? time(arm.seconds) : "");
@@ -202,7 +222,9 @@ function showTile(tile, pupil) {
   const { report, presence } = pupil;
   const isHolder = shown.arm?.holder === pupil.pupil;
   const doing = presence === "here" ? report && TEXTS.doing[report.doing][language] : text(presence);
-  const stopped = { asked: "stopping_all", holds: "stopped", limp: "limp_stopped" }[pupil.stop];
+  // An arm that moves again is not told as stopped.
+  const isStopped = pupil.stop === "asked" || ["stopped", "limp"].includes(report?.doing);
+  const stopped = isStopped && { asked: "stopping_all", holds: "stopped", limp: "limp_stopped" }[pupil.stop];
   const goals = report?.goals;
   const solved = goals && goals.reached >= goals.all;
   const more = [
@@ -268,8 +290,9 @@ const ACTIONS = {
   "take-back": () => send("take_back"),
   give: button => {
     const seconds = Math.round(Number($("minutes").value) * 60);
-    notice(seconds > 0 ? "" : text("bad_time"));
-    if (seconds > 0) send({ give: { pupil: Number(button.dataset.pupil), seconds } });
+    const isGood = seconds >= 1 && seconds <= 3600;
+    notice(isGood ? "" : text("bad_time"));
+    if (isGood) send({ give: { pupil: Number(button.dataset.pupil), seconds } });
   },
   "close-notice": () => notice(""),
   language: () => {
@@ -295,9 +318,10 @@ document.addEventListener("keydown", event => {
   if (event.key === " " && event.target.id !== "say") {
     // Also on buttons, which the space bar would press: a stop works from everywhere.
     event.preventDefault();
-    ACTIONS.stop();
+    if (!event.repeat) ACTIONS.stop();
   }
-  if (event.key === "Enter" && event.target.id === "say") ACTIONS.say();
+  // The Enter that ends the input of Chinese sends nothing.
+  if (event.key === "Enter" && event.target.id === "say" && !event.isComposing) ACTIONS.say();
 });
 // Some browsers click a button when the space bar is released.
 document.addEventListener("keyup", event => event.key === " " && event.target.id !== "say" && event.preventDefault());

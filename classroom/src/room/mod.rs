@@ -214,7 +214,7 @@ impl Classroom {
     /// The real arm has news.
     pub fn arm_news(&mut self, now: Instant, news: ArmNews) {
         let Some(arm) = &mut self.arm else { return };
-        let (is_new, confirms_stop) = arm.take_news(now, news);
+        let (is_new, confirms_stop) = arm.take_news(news);
         if confirms_stop {
             self.stop.iter_mut().for_each(|stop| stop.note_confirmed(now));
         }

@@ -1,15 +1,15 @@
 //! From the line to the clients: each reply to the client that asked, with the registers that are not the arm's.
 
 use host_link::sharing::{self, DrivenBy, SharingState};
-use protocol_core::registers::map::{FAULTS, fault};
+use protocol_core::registers::map::{FAULTS, fault, motor_state};
 use protocol_core::time::Instant;
 
-use super::Hub;
 use super::client::{Client, Event};
 use super::client_id::ClientId;
 use super::line::Owner;
 use super::own_registers::byte_at;
 use super::request::WholeRequest;
+use super::{HoldOutcome, Hub};
 
 impl Hub {
     pub(super) fn deliver(&mut self, now: Instant, owner: Owner, event: Event) {
@@ -33,8 +33,13 @@ impl Hub {
                 self.continue_hold(now, Some((address, &values)));
             }
             (Owner::Hold, _) => self.continue_hold(now, None),
+            // A hold that began meanwhile has an outcome of its own.
+            (Owner::MotorState, Event::Reply { values, .. }) if self.hold.is_none() => {
+                let is_on = values.first() == Some(&motor_state::SERVO);
+                self.hold_outcome = Some(if is_on { HoldOutcome::Holds } else { HoldOutcome::Limp });
+            }
             (Owner::Identity, Event::Reply { values, .. }) => self.identify(now, &values),
-            (Owner::Sample(_) | Owner::Identity, _) => {}
+            (Owner::Sample(_) | Owner::Identity | Owner::MotorState, _) => {}
         }
     }
 

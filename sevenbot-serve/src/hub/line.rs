@@ -41,6 +41,8 @@ pub(crate) enum Owner {
     Sample(Stream),
     /// The hub, to hold the arm.
     Hold,
+    /// The hub, to find out whether the motors of an arm that it has held are on.
+    MotorState,
     /// The hub, to find out whether a 7Bot V2 is there.
     Identity,
 }
@@ -48,7 +50,7 @@ pub(crate) enum Owner {
 impl Owner {
     const fn patience(self) -> Patience {
         match self {
-            Self::Client(_) | Self::Hold => CLIENT_PATIENCE,
+            Self::Client(_) | Self::Hold | Self::MotorState => CLIENT_PATIENCE,
             Self::Sample(_) | Self::Identity => OWN_PATIENCE,
         }
     }

@@ -60,6 +60,15 @@ pub use self::stream::Stream;
 /// Time between two questions to a port behind which no arm has answered yet.
 const IDENTIFY_PERIOD: Duration = Duration::from_millis(250);
 
+/// How an arm is after a hold of the hub.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum HoldOutcome {
+    /// Its joints hold where they are.
+    Holds,
+    /// Its motors are off.
+    Limp,
+}
+
 /// What clients may do.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct HubOptions {
@@ -94,8 +103,8 @@ pub struct Hub {
     watchdog: ClientWatchdog,
     /// The hub holds the arm by itself.
     hold: Option<ArmHold>,
-    /// The last hold ended, and the arm has confirmed it.
-    has_held: bool,
+    /// What came of the last hold.
+    hold_outcome: Option<HoldOutcome>,
     held: HeldTargets,
     driver: Driver,
     /// Stops of all clients so far, wrapping.
@@ -120,7 +129,7 @@ impl Hub {
             sampler: Sampler::new(baud),
             watchdog: ClientWatchdog::default(),
             hold: None,
-            has_held: false,
+            hold_outcome: None,
             held: HeldTargets::default(),
             driver: Driver::new(options.has_one_driver),
             stops: 0,
@@ -164,7 +173,7 @@ impl Hub {
 
     /// Holds the arm; after the hold in progress, if there is one.
     fn start_hold(&mut self) {
-        self.has_held = false;
+        self.hold_outcome = None;
         if let Some(hold) = &mut self.hold {
             return hold.want_again();
         }
@@ -178,10 +187,10 @@ impl Hub {
         self.hold.is_some()
     }
 
-    /// Has the arm confirmed the last hold of the hub, and is no other one in progress?
+    /// What the arm has confirmed of the last hold of the hub; `None`: nothing yet.
     #[must_use]
-    pub const fn has_held(&self) -> bool {
-        self.has_held
+    pub const fn hold_outcome(&self) -> Option<HoldOutcome> {
+        self.hold_outcome
     }
 
     /// The clients that have something new since the last call: events, or room for requests.
@@ -223,7 +232,7 @@ impl Hub {
     /// Nothing of what was sent or waits may reach the arm that comes next.
     fn forget_arm(&mut self) {
         self.line.reset();
-        (self.hold, self.has_held) = (None, false);
+        (self.hold, self.hold_outcome) = (None, None);
         self.held = HeldTargets::default();
         self.driver.end(None);
         for (&id, client) in &mut self.clients {

@@ -51,10 +51,7 @@ impl OwnRegisters {
     /// The map whose form a read of these registers has: that of the client's last write, or `before_writes`. `None` if
     /// there are no offsets among them.
     pub(crate) fn form_of_read(&self, address: u8, count: u8, before_writes: Map) -> Option<Map> {
-        let (first, end) = (u16::from(address), u16::from(address) + u16::from(count));
-        let offsets = u16::from(OFFSET.address);
-        let has_offsets = first < offsets + u16::from(OFFSET.count) && offsets < end;
-        has_offsets.then_some(self.last_map.unwrap_or(before_writes))
+        has_offsets(address, count).then_some(self.last_map.unwrap_or(before_writes))
     }
 
     /// A write of 53 stops the reports of map 2.1 ([M4](protocol_core::decisions#m4)).
@@ -92,6 +89,13 @@ impl OwnRegisters {
             }
         }
     }
+}
+
+/// Are there offsets among the `count` registers from `address` on?
+pub(super) fn has_offsets(address: u8, count: u8) -> bool {
+    let (first, end) = (u16::from(address), u16::from(address) + u16::from(count));
+    let offsets = u16::from(OFFSET.address);
+    first < offsets + u16::from(OFFSET.count) && offsets < end
 }
 
 /// The byte of a register in the values from `address` on.

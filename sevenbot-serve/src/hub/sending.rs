@@ -10,6 +10,7 @@ use super::client::Waiting;
 use super::client_id::ClientId;
 use super::intent::Intent;
 use super::line::Owner;
+use super::own_registers::has_offsets;
 use super::request::{WholeRequest, read_bytes, without_idle_ends};
 use super::shares::Shares;
 use super::stream::Stream;
@@ -70,7 +71,10 @@ impl Hub {
         match hold.is_over() {
             false => self.hold = Some(hold),
             true if hold.is_wanted_again() => self.start_hold(),
-            true => self.has_held = hold.is_confirmed(),
+            true if hold.is_confirmed() => {
+                self.line.send_read(now, Owner::MotorState, MOTOR_STATE.address, MOTOR_STATE.count);
+            }
+            true => {}
         }
     }
 
@@ -140,11 +144,12 @@ impl Hub {
     /// Takes the reads of the same registers that are next of other clients: one reply answers all. Many programs read where the
     /// arm is. A read of the offsets is a client's own, because of their form.
     fn take_equal_reads(&mut self, now: Instant, id: ClientId, address: u8, count: u8) -> Vec<ClientId> {
-        let form = self.known.form_before_writes();
         let mut others = Vec::new();
+        if has_offsets(address, count) {
+            return others;
+        }
         for (&other, client) in self.clients.iter_mut().filter(|(other, _)| **other != id) {
-            let is_next = client.waits_to_read(address, count);
-            if is_next && client.own.form_of_read(address, count, form).is_none() {
+            if client.waits_to_read(address, count) {
                 client.waiting.pop_front();
                 client.unanswered += 1;
                 self.watchdog.sent_request(now, other);

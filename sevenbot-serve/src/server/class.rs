@@ -11,7 +11,7 @@ use protocol_core::time::Instant;
 use tokio::sync::{Notify, watch};
 
 use super::shared::{Shared, lock};
-use crate::hub::{ClientId, WholeRequest};
+use crate::hub::{ClientId, HoldOutcome, WholeRequest};
 
 /// Time between two looks at the clock: a lease that is over ends so late at most.
 const TICK: Duration = Duration::from_millis(50);
@@ -72,7 +72,8 @@ impl Class {
         let news = self.shared.with_hub(|hub, _| ArmNews {
             answers: hub.has_arm(),
             is_holding: hub.is_holding(),
-            holds: hub.has_held(),
+            holds: hub.hold_outcome().is_some(),
+            is_limp: hub.hold_outcome() == Some(HoldOutcome::Limp),
         });
         room.arm_news(now, news);
     }

@@ -227,7 +227,8 @@ impl App {
         let (was_own, is_own) = (is_own(&class.arm), is_own(&arm));
         class.arm = arm;
         match (was_own, is_own, over) {
-            (false, true, _) => self.begin_real_arm(),
+            // Given again: the server ended the connection of the lease before.
+            (false, true, _) | (true, true, Some(_)) => self.begin_real_arm(),
             (true, false, over) => self.end_real_arm(Some(match over {
                 Some(LeaseEnd::Time) => "arm-over-time",
                 Some(LeaseEnd::Lost) => "arm-over-lost",
@@ -240,11 +241,12 @@ impl App {
 
     /// The page drives the real arm from now on. Its simulated arm stands still meanwhile.
     fn begin_real_arm(&mut self) {
-        self.end_movement();
+        self.stop();
+        self.carry_out_stop();
         let Some(query) = self.class.as_ref().and_then(ClassTab::arm_query) else { return };
         let Ok(source) = SocketSource::connect_with(&query) else { return };
-        let own = self.swap_line((Line::Remote(Box::new(source)), Client::default()));
-        self.set_aside = Some(own);
+        let before = self.swap_line((Line::Remote(Box::new(source)), Client::default()));
+        self.set_aside.get_or_insert(before);
         self.dom.choose("source", "server");
         self.dom.notice(self.language.text("arm-begins"));
     }

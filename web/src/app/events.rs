@@ -313,7 +313,9 @@ impl App {
         if key.key() == "Escape" {
             self.end_tour();
         }
-        if key.key() == "Enter" && target.as_ref().is_some_and(|target| target.id().starts_with("class-")) {
+        // The Enter that ends the input of Chinese joins nothing.
+        let is_typed = key.key() == "Enter" && !key.is_composing();
+        if is_typed && target.as_ref().is_some_and(|target| target.id().starts_with("class-")) {
             self.act_on_class("join-class");
         }
         // The same number again is no change. A joint that was blocked is told to try again with it.

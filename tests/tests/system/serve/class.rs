@@ -5,7 +5,7 @@ use std::net::TcpStream;
 use std::time::Duration;
 
 use serde_json::{Value, json};
-use system_tests::registers::{MOVING_JOINTS, PRESENT_POSITION, SPEED, TARGET_POSITION};
+use system_tests::registers::{MOTOR_STATE, MOVING_JOINTS, PRESENT_POSITION, SPEED, TARGET_POSITION};
 use system_tests::wait::wait_for;
 use system_tests::{read_request, write_request};
 use tungstenite::{Message, WebSocket};
@@ -248,6 +248,19 @@ fn the_arm_is_held_when_it_is_taken_back_or_its_pupil_is_gone() {
     drive(&mut frames, 10);
     drop(mia);
     check_held(&class, &mut teacher, frames, 10);
+}
+
+#[test]
+fn an_arm_whose_motors_were_switched_off_is_not_told_as_held() {
+    let class = Class::start(true, "");
+    let (mut teacher, mut mia) = (class.teacher(), class.join("Mia"));
+    give(&mut teacher, "Mia", 600);
+    wait_for_arm(&mut mia, true);
+    let mut frames = class.frames(&mia.key).expect("accepted");
+    frames.send(Message::binary(write_request(MOTOR_STATE, &[2]))).expect("the server takes frames");
+    assert_eq!(read(&mut frames, MOTOR_STATE, 1), [2]);
+    teacher.say(&json!("take_back"));
+    shown(&mut teacher, |class| class["arm"]["stop"] == "limp" && class["arm"]["holder"].is_null());
 }
 
 #[test]
