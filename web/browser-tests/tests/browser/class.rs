@@ -79,7 +79,7 @@ fn a_stop_for_all_ends_the_programs_of_the_pupils_and_says_who_stopped() {
     // The space bar stops all from everywhere.
     teacher.focus("[data-action=language]");
     teacher.key(" ");
-    teacher.wait_for_text("#state", "Stopped: all arms hold (2)");
+    teacher.wait_for_text("#state", "Last stop: confirmed by all arms (2)");
     for (page, name) in [(&mut mia, "Mia"), (&mut second, "Mia 2")] {
         page.wait_for_text("#notice", "The program ended early: Stopped by the teacher.");
         page.wait_for_text("#program-state", "The program was ended.");
@@ -197,7 +197,7 @@ fn thirty_tabs_stop_together() {
         teacher.click("#stop");
         let stop = wait_for("all arms hold", || {
             let text = teacher.text("#state");
-            let confirmed = text.contains(&format!("all arms hold ({TABS})"));
+            let confirmed = text.contains(&format!("confirmed by all arms ({TABS})"));
             let is_last = teacher.evaluate("window.sevenbot.stop_number()") == number;
             if confirmed && is_last { Ok(text) } else { Err(text) }
         });
