@@ -165,6 +165,11 @@ impl CommandChecker {
         self.is_written_for_later[joint] = may_be_let_go;
     }
 
+    /// True if the last target of the host came while the joint may have been let go (D28).
+    pub(super) fn keeps_target(&self, joint: Joint) -> bool {
+        self.is_written_for_later[joint]
+    }
+
     /// Register 29 was written: the attempts count anew (D28).
     pub(super) fn state_written(&mut self) {
         self.attempts = PerJoint::default();

@@ -160,7 +160,9 @@ impl TortureWorld {
         };
         if extended_model::shows_block(&expected) {
             arm.model.compare_fine_targets(arm.controller.registers())?;
-            arm.let_go_rule.check(arm.controller.registers(), &arm.model.target_writes)?;
+            let PoweredArm { let_go_rule, controller, model, command_checker, .. } = &mut *arm;
+            let keeps_target = |joint| command_checker.keeps_target(joint);
+            let_go_rule.check(controller.registers(), &model.target_writes, keeps_target)?;
             arm.check_status(self.now, &self.bus, |checker, context| checker.check_fine_positions(context))?;
         }
         ensure(arm.output_bytes == expected, || format!("the frame to the host should be {expected:02x?}"))

@@ -27,13 +27,21 @@ impl LetGoRule {
     /// No joint is let go.
     pub(super) const NONE: Self = Self(PerJoint::all(None));
 
-    /// Checks the registers, which the host reads now. `writes`: how often the host wrote each target.
-    pub(super) fn check(&mut self, registers: &RegisterFile, writes: &PerJoint<u64>) -> Check {
+    /// Checks the registers, which the host reads now. `writes`: how often the host wrote each target. `keeps_target`: it wrote the last
+    /// one while the joint may have been let go.
+    pub(super) fn check(
+        &mut self,
+        registers: &RegisterFile,
+        writes: &PerJoint<u64>,
+        keeps_target: impl Fn(Joint) -> bool,
+    ) -> Check {
         for joint in Joint::ALL {
             let [target, present] =
                 [TARGET_POSITION, PRESENT_POSITION].map(|row| registers.get(row.of(joint)));
             let writes = writes[joint];
-            let is_let_go = registers.get(PROTECTION) == 1 && registers.get(LET_GO) & joint.bit() != 0;
+            let is_let_go = registers.get(PROTECTION) == 1
+                && registers.get(LET_GO) & joint.bit() != 0
+                && !keeps_target(joint);
             let before = self.0[joint].filter(|before| is_let_go && before.writes == writes);
             let has_turned = before.is_some_and(|before| before.present != present);
             let was_behind = before.is_some_and(|before| before.is_behind && before.target == target);
@@ -64,7 +72,7 @@ mod tests {
         for (present, target, writes) in [(90, 90, 5), (80, 90, 5), (70, target, writes)] {
             registers.set(PRESENT_POSITION.of(JOINT), present);
             registers.set(TARGET_POSITION.of(JOINT), target);
-            rule.check(&registers, &PerJoint::all(writes))?;
+            rule.check(&registers, &PerJoint::all(writes), |_| false)?;
         }
         Ok(())
     }
