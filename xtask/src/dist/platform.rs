@@ -30,13 +30,13 @@ pub(super) const LINUX_X86_64: Platform = Platform {
     triple: "x86_64-unknown-linux-gnu",
     name: "linux-x86_64",
     debian: Some("amd64"),
-    wheel: "manylinux_2_17_x86_64.manylinux2014_x86_64",
+    wheel: "manylinux2014_x86_64.manylinux_2_17_x86_64",
 };
 pub(super) const LINUX_AARCH64: Platform = Platform {
     triple: "aarch64-unknown-linux-gnu",
     name: "linux-aarch64",
     debian: Some("arm64"),
-    wheel: "manylinux_2_17_aarch64.manylinux2014_aarch64",
+    wheel: "manylinux2014_aarch64.manylinux_2_17_aarch64",
 };
 pub(super) const WINDOWS: Platform =
     Platform { triple: "x86_64-pc-windows-gnu", name: "windows-x86_64", debian: None, wheel: "win_amd64" };

@@ -165,9 +165,9 @@ impl CommandChecker {
         self.is_written_for_later[joint] = may_be_let_go;
     }
 
-    /// True if the last target of the host came while the joint may have been let go (D28).
+    /// True if the last target of the host came while the joint may have been let go, and it did not engage since (D28).
     pub(super) fn keeps_target(&self, joint: Joint) -> bool {
-        self.is_written_for_later[joint]
+        self.is_written_for_later[joint] && self.engaged_at[joint] <= self.target_written_at[joint]
     }
 
     /// Register 29 was written: the attempts count anew (D28).
