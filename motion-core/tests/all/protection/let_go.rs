@@ -33,6 +33,20 @@ fn d28_an_overload_lets_go_is_damped_and_engages_where_it_came_to_rest() {
 }
 
 #[test]
+fn d28_the_target_of_a_joint_that_is_let_go_follows_it() {
+    let (mut rig, _) = tripped(Trip::Heat);
+    let before = rig.present()[2];
+    rig.run_ms(400);
+    for _ in 0..20 {
+        rig.run_ms(100);
+        assert_eq!(rig.get(LET_GO), bit(3));
+        let (target, present) = (rig.targets()[2], rig.present()[2]);
+        assert!(target.abs_diff(present) <= 1, "the target is {target} at {present} degrees");
+    }
+    assert!(rig.present()[2].abs_diff(before) > 5, "it fell");
+}
+
+#[test]
 fn d28_heat_has_to_fall_by_five_degrees() {
     let (mut rig, _) = tripped(Trip::Heat);
     rig.run_ms(3_000);
