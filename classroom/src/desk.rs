@@ -4,9 +4,9 @@ use protocol_core::time::{Duration, Instant};
 
 use crate::message::{NotGiven, ToTeacher};
 
-/// The class is shown at most this often while something happens,
+/// Least time between two pictures of the class.
 const PERIOD: Duration = Duration::from_millis(100);
-/// and this often otherwise: times run on.
+/// Time between two of them while nothing happens: the time of a lease runs on.
 const LONGEST_PERIOD: Duration = Duration::from_millis(500);
 
 #[derive(Debug, Default)]

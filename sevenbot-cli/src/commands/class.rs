@@ -9,7 +9,7 @@ use serde::Serialize;
 use sevenbot_serve::hub::HubOptions;
 use sevenbot_serve::server::{ArmLocation, ClassConfig, Server, ServerConfig, TlsFiles};
 
-use super::serve::{check_not_busy, default_local, location, run_server, stop_signal};
+use super::serve::{check_not_busy, default_local, location, open_server, run_server};
 use crate::command_error::CommandError;
 use crate::page_file;
 use crate::printer::{Printable, note};
@@ -100,9 +100,7 @@ pub(crate) fn run(session: &mut Session, args: &ClassArgs) -> Result<(), Command
     arm.iter().try_for_each(|arm| check_not_busy(arm, session.options.baud))?;
     let (config, pages) = config(session, args, arm)?;
     let local = config.arm.as_ref().and_then(|_| default_local(None));
-    let config = ServerConfig { socket: local.as_ref().map(|local| local.socket.clone()), ..config };
-    let stop = stop_signal()?;
-    let server = Server::open(config).map_err(|error| CommandError::Arm(error.to_string()))?;
+    let (server, stop) = open_server(config, local.as_ref(), Server::open)?;
     pages.announce(session, args, &server)?;
     run_server(server, &stop, local.as_ref())
 }

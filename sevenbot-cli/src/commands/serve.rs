@@ -14,7 +14,7 @@ use sevenbot::simulated::simulated_port;
 use sevenbot::{OpenError, ports};
 use sevenbot_serve::hub::HubOptions;
 use sevenbot_serve::server::{
-    AccessPolicy, ArmLocation, Notice, RefusalReason, Server, ServerConfig, Stop, TlsFiles,
+    AccessPolicy, ArmLocation, Notice, RefusalReason, Server, ServerConfig, StartError, Stop, TlsFiles,
 };
 
 use crate::advice::START_SIMULATOR;
@@ -138,13 +138,23 @@ pub(crate) fn run(session: &mut Session, args: &ServeArgs) -> Result<(), Command
                 .to_owned(),
         ));
     }
-    let config = ServerConfig { socket: local.as_ref().map(|local| local.socket.clone()), ..config };
-    // Before the links are created: Ctrl-C has to remove them.
-    let stop = stop_signal()?;
-    let server = Server::open(config).map_err(|error| CommandError::Arm(error.to_string()))?;
+    let (server, stop) = open_server(config, local.as_ref(), Server::open)?;
     announce(session, args, &server)?;
     let _announcement = announce_name(args, &server);
     run_server(server, &stop, local.as_ref())
+}
+
+/// Opens a server, with its Unix socket, by `open`.
+pub(super) fn open_server(
+    config: ServerConfig,
+    local: Option<&LocalServer>,
+    open: impl FnOnce(ServerConfig) -> Result<Server, StartError>,
+) -> Result<(Server, Stop), CommandError> {
+    // Before the links are created: Ctrl-C has to remove them.
+    let stop = stop_signal()?;
+    let config = ServerConfig { socket: local.map(|local| local.socket.clone()), ..config };
+    let server = open(config).map_err(|error| CommandError::Arm(error.to_string()))?;
+    Ok((server, stop))
 }
 
 /// Serves until it is stopped. Other programs of this user find the server by `local`.
@@ -276,7 +286,7 @@ pub(super) fn check_not_busy(arm: &ArmLocation, baud: u32) -> Result<(), Command
 }
 
 /// Ends the server at Ctrl-C, and at signals that ask a program to end.
-pub(super) fn stop_signal() -> Result<Stop, CommandError> {
+fn stop_signal() -> Result<Stop, CommandError> {
     let stop = Stop::default();
     let trigger = stop.clone();
     ctrlc::set_handler(move || trigger.stop())

@@ -7,7 +7,7 @@ use sevenbot::simulated::simulated_port;
 use sevenbot_serve::hub::HubOptions;
 use sevenbot_serve::server::{ArmLocation, PageConfig, Server, ServerConfig, StartError};
 
-use super::serve::{Ready, check_not_busy, default_local, location, run_server, stop_signal};
+use super::serve::{Ready, check_not_busy, default_local, location, open_server, run_server};
 use crate::command_error::CommandError;
 use crate::page_file;
 use crate::printer::note;
@@ -68,12 +68,10 @@ pub(crate) fn run(session: &mut Session, args: &ViewArgs) -> Result<(), CommandE
     let local = arm.as_ref().and_then(|_| default_local(None));
     let config = ServerConfig {
         page: Some(page),
-        socket: local.as_ref().map(|local| local.socket.clone()),
         options: HubOptions { is_read_only: args.read_only, ..HubOptions::default() },
         ..ServerConfig::new(arm, session.options.baud)
     };
-    let stop = stop_signal()?;
-    let server = open(config, args.http.is_none()).map_err(|error| CommandError::Arm(error.to_string()))?;
+    let (server, stop) = open_server(config, local.as_ref(), |config| open(config, args.http.is_none()))?;
     if let Some(address) = server.page_address() {
         let address = format!("http://{address}/{query}");
         session.printer.print(&Ready { ready: address.clone() })?;

@@ -4,6 +4,7 @@ use protocol_core::registers::map::{FINE_TARGET, MOTOR_STATE, TARGET_POSITION, V
 use protocol_core::registers::map21::{DISC_DIRECTION, TIP_POSITION, WRIST_POSITION};
 use protocol_core::registers::{JOINTS, Map, Register};
 
+use super::own_registers::covers;
 use super::readings::Readings;
 use protocol_core::time::Instant;
 
@@ -30,7 +31,7 @@ pub(crate) enum Intent {
 impl Intent {
     /// Of a write, sent by a client that has read these positions.
     pub(crate) fn of(now: Instant, map: Map, address: u8, values: &[u8], readings: &Readings) -> Self {
-        let covers = |row: &Register| covers(row, address, values);
+        let covers = |row: &Register| covers(row, address, values.len());
         let state = byte_at(MOTOR_STATE.address, address, values);
         if matches!(state, Some(motor_state::DAMPING | motor_state::FORCELESS)) {
             return Self::MotorsOff;
@@ -74,13 +75,6 @@ impl Intent {
     pub(crate) const fn is_ended_by_stop(self) -> bool {
         matches!(self, Self::Motion | Self::Switch)
     }
-}
-
-/// Does a write from `address` on cover a register of the row?
-fn covers(row: &Register, address: u8, values: &[u8]) -> bool {
-    let (first, end) = (usize::from(row.address), usize::from(row.address) + usize::from(row.count));
-    let start = usize::from(address);
-    start < end && first < start + values.len()
 }
 
 fn byte_at(register: u8, address: u8, values: &[u8]) -> Option<u8> {

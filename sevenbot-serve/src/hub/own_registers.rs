@@ -51,7 +51,7 @@ impl OwnRegisters {
     /// The map whose form a read of these registers has: that of the client's last write, or `before_writes`. `None` if
     /// there are no offsets among them.
     pub(crate) fn form_of_read(&self, address: u8, count: u8, before_writes: Map) -> Option<Map> {
-        has_offsets(address, count).then_some(self.last_map.unwrap_or(before_writes))
+        covers(&OFFSET, address, count.into()).then_some(self.last_map.unwrap_or(before_writes))
     }
 
     /// A write of 53 stops the reports of map 2.1 ([M4](protocol_core::decisions#m4)).
@@ -91,11 +91,10 @@ impl OwnRegisters {
     }
 }
 
-/// Are there offsets among the `count` registers from `address` on?
-pub(super) fn has_offsets(address: u8, count: u8) -> bool {
-    let (first, end) = (u16::from(address), u16::from(address) + u16::from(count));
-    let offsets = u16::from(OFFSET.address);
-    first < offsets + u16::from(OFFSET.count) && offsets < end
+/// Are there registers of the row among the `count` ones from `address` on?
+pub(super) fn covers(row: &Register, address: u8, count: usize) -> bool {
+    let (first, start) = (usize::from(row.address), usize::from(address));
+    start < first + usize::from(row.count) && first < start + count
 }
 
 /// The byte of a register in the values from `address` on.

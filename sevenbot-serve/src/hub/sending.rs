@@ -1,7 +1,7 @@
 //! From the queues to the line: stops first, then what the hub does by itself, then the client whose turn it is.
 
 use protocol_core::registers::Map;
-use protocol_core::registers::map::{MOTOR_STATE, SET_POINT_PERIOD, motor_state};
+use protocol_core::registers::map::{MOTOR_STATE, OFFSET, SET_POINT_PERIOD, motor_state};
 use protocol_core::time::Instant;
 
 use super::Hub;
@@ -10,7 +10,7 @@ use super::client::Waiting;
 use super::client_id::ClientId;
 use super::intent::Intent;
 use super::line::Owner;
-use super::own_registers::has_offsets;
+use super::own_registers::covers;
 use super::request::{WholeRequest, read_bytes, without_idle_ends};
 use super::shares::Shares;
 use super::stream::Stream;
@@ -145,7 +145,7 @@ impl Hub {
     /// arm is. A read of the offsets is a client's own, because of their form.
     fn take_equal_reads(&mut self, now: Instant, id: ClientId, address: u8, count: u8) -> Vec<ClientId> {
         let mut others = Vec::new();
-        if has_offsets(address, count) {
+        if covers(&OFFSET, address, count.into()) {
             return others;
         }
         for (&other, client) in self.clients.iter_mut().filter(|(other, _)| **other != id) {

@@ -22,11 +22,13 @@ mod byte_server;
 mod class;
 mod class_session;
 mod class_site;
+mod config;
 mod descriptors;
 mod frame_session;
 mod listener;
 #[cfg(unix)]
 mod local_socket;
+mod network;
 mod new_key;
 mod notice;
 mod pace;
@@ -47,39 +49,34 @@ mod web_socket;
 
 use std::io;
 use std::net::{IpAddr, SocketAddr};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
-use classroom::{ClassInfo, Classroom, MOST_PUPILS};
 use tokio::net::TcpListener;
 use tokio::runtime::{Builder, Runtime};
 use tokio::sync::mpsc;
 use tokio_rustls::TlsAcceptor;
 
-use self::admission::Admission;
 use self::arm_port::ArmPort;
-use self::byte_server::ByteServer;
-use self::class::Class;
-use self::class_site::ClassSite;
 use self::listener::open_tcp;
 #[cfg(unix)]
 use self::local_socket::LocalSocket;
+use self::network::Network;
 use self::notice::Notices;
 #[cfg(target_os = "linux")]
 use self::pty::PtyPort;
 use self::shared::Shared;
-use self::site::{PageSite, Site};
 #[cfg(not(unix))]
 use self::unsupported::LocalSocket;
 #[cfg(not(target_os = "linux"))]
 use self::unsupported::PtyPort;
-use self::web_server::WebServer;
-use crate::hub::{Hub, HubOptions};
+use crate::hub::Hub;
 
 pub use self::access::AccessPolicy;
 pub use self::answer::PageFiles;
 pub use self::arm_location::ArmLocation;
+pub use self::config::ServerConfig;
 pub use self::new_key::NewKey;
 pub use self::notice::{Notice, RefusalReason};
 pub use self::site::{ClassConfig, PageConfig};
@@ -89,63 +86,12 @@ pub use self::tls::TlsFiles;
 
 /// Notices about refused clients that may wait. More are dropped.
 const MOST_NOTICES: usize = 4;
-/// Connections with which a browser loads the page. A class opens it all at once.
-const FILES_OF_EACH_TAB: usize = 4;
-/// Teacher's screens, and sessions with the arm of a class.
-const OTHER_TABS: usize = 8;
 /// Time between two notices about refused clients, so that a flood of them fills no log.
 const NOTICE_PERIOD: Duration = Duration::from_millis(200);
 
 /// Turns of tasks after which it is looked which other connections have bytes. A flood keeps tasks ready all the time, and a stop
 /// must not wait for many of their turns.
 const POLL_INTERVAL: u32 = 4;
-
-/// What to serve.
-#[derive(Clone, Debug)]
-pub struct ServerConfig {
-    /// The serial port of the arm; `None`: there is no arm.
-    pub arm: Option<ArmLocation>,
-    /// Its rate, in bits per second.
-    pub baud: u32,
-    /// Links to pseudo-terminals; Linux only.
-    pub ptys: Vec<PathBuf>,
-    /// A Unix socket for programs of this user; not on Windows.
-    pub socket: Option<PathBuf>,
-    /// Address for clients that speak frames over TCP.
-    pub tcp: Option<SocketAddr>,
-    /// Address for clients of the maker's WebSocket.
-    pub web_socket: Option<SocketAddr>,
-    /// The page for a browser.
-    pub page: Option<PageConfig>,
-    /// The page for a class.
-    pub class: Option<ClassConfig>,
-    /// Who may connect over TCP and the maker's WebSocket.
-    pub access: AccessPolicy,
-    /// TCP, the maker's WebSocket and the class are encrypted.
-    pub tls: Option<TlsFiles>,
-    /// What clients may do.
-    pub options: HubOptions,
-}
-
-impl ServerConfig {
-    /// Nothing is served of an arm on a line with this rate, in bits per second.
-    #[must_use]
-    pub const fn new(arm: Option<ArmLocation>, baud: u32) -> Self {
-        Self {
-            arm,
-            baud,
-            ptys: Vec::new(),
-            socket: None,
-            tcp: None,
-            web_socket: None,
-            page: None,
-            class: None,
-            access: AccessPolicy { token: None, allows_any_page: false },
-            tls: None,
-            options: HubOptions { is_read_only: false, has_one_driver: false },
-        }
-    }
-}
 
 /// A server that has opened everything but the arm's port.
 #[derive(Debug)]
@@ -272,86 +218,6 @@ impl Server {
                 }
             }
         })
-    }
-}
-
-/// What the connections of the network share.
-struct Network {
-    shared: Arc<Shared>,
-    notices: Notices,
-    tls: Option<TlsAcceptor>,
-}
-
-impl Network {
-    /// Serves what is open.
-    fn spawn(
-        self,
-        config: &ServerConfig,
-        socket: Option<LocalSocket>,
-        tcp: Option<TcpListener>,
-        web_socket: Option<TcpListener>,
-        page: Option<TcpListener>,
-    ) {
-        let most = descriptors::connections();
-        let admission = Admission::new(most);
-        // Programs of this user keep their places whatever the network does.
-        let local = ByteServer {
-            admission: Admission::new(most),
-            token: None,
-            tls: None,
-            ..self.bytes(config, &admission)
-        };
-        socket.into_iter().for_each(|socket| drop(tokio::spawn(local.clone().serve_local(socket))));
-        if let Some(listener) = tcp {
-            tokio::spawn(self.bytes(config, &admission).serve_tcp(listener));
-        }
-        if let Some(listener) = web_socket {
-            let site = Site::Maker(config.access.clone());
-            tokio::spawn(self.web(site, self.tls.clone(), &admission).serve(listener));
-        }
-        if let (Some(listener), Some(PageConfig { token, files, .. })) = (page, &config.page) {
-            let (files, token, has_arm) = (*files, token.clone(), config.arm.is_some());
-            let site = Site::Page(PageSite { files, token, has_arm });
-            tokio::spawn(self.web(site, None, &admission).serve(listener));
-        }
-    }
-
-    /// Serves the class, if there is one. Pupils never take the places of the teacher's screens and of the arm.
-    fn spawn_class(&self, config: &ServerConfig, listener: Option<TcpListener>) {
-        let (Some(listener), Some(settings)) = (listener, config.class.clone()) else { return };
-        let ClassConfig { files, code, secret, hosts, new_key, .. } = settings;
-        let port = listener.local_addr().map_or(0, |address| address.port());
-        let is_encrypted = self.tls.is_some();
-        let addresses = hosts.into_iter().map(|host| class_site::page(host, port, is_encrypted)).collect();
-        let info = ClassInfo { addresses, code: code.clone(), has_arm: config.arm.is_some() };
-        let class = Class::new(Arc::clone(&self.shared), Classroom::new(info));
-        tokio::spawn(Arc::clone(&class).run());
-        let site = Site::Class(ClassSite { files, code, secret, class: Arc::clone(&class), is_encrypted });
-        let admission =
-            Admission::with_unknown(MOST_PUPILS + OTHER_TABS, FILES_OF_EACH_TAB * descriptors::connections());
-        let server = self.web(site, self.tls.clone(), &admission);
-        tokio::spawn(WebServer { class: Some((class, new_key)), ..server }.serve(listener));
-    }
-
-    fn bytes(&self, config: &ServerConfig, admission: &Arc<Admission>) -> ByteServer {
-        ByteServer {
-            shared: Arc::clone(&self.shared),
-            admission: Arc::clone(admission),
-            notices: self.notices.clone(),
-            token: config.access.token.clone(),
-            tls: self.tls.clone(),
-        }
-    }
-
-    fn web(&self, site: Site, tls: Option<TlsAcceptor>, admission: &Arc<Admission>) -> WebServer {
-        WebServer {
-            shared: Arc::clone(&self.shared),
-            admission: Arc::clone(admission),
-            notices: self.notices.clone(),
-            site,
-            tls,
-            class: None,
-        }
     }
 }
 

@@ -1,4 +1,4 @@
-//! HTTP: the files of the page, and the WebSockets at `/frames` and `/ws`.
+//! HTTP: the files of the page, and the WebSockets at `/frames`, `/ws`, `/class` and `/teacher`.
 //!
 //! ```text
 //!   browser ── GET /, /style.css ... ──▶ WebServer ──▶ answer: a file

@@ -1,4 +1,4 @@
-//! WebSockets: frames in binary messages for the page, and the maker's commands in text messages.
+//! WebSockets: frames in binary messages for the page; the maker's commands and those of a class in text messages.
 
 use std::pin::Pin;
 use std::sync::Arc;

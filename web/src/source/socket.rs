@@ -1,4 +1,4 @@
-//! An arm behind `sevenbot view`: a WebSocket whose binary messages carry the bytes of frames.
+//! An arm behind `sevenbot view` or `sevenbot class`: a WebSocket whose binary messages carry the bytes of frames.
 
 use std::cell::RefCell;
 use std::rc::Rc;
