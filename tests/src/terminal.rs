@@ -23,6 +23,8 @@ const COLUMNS: NonZeroU16 = NonZeroU16::new(80).unwrap();
 pub struct Terminal {
     pty: Arc<Pty>,
     screen: Arc<Mutex<Parser>>,
+    /// All bytes that the program has written.
+    output: Arc<Mutex<Vec<u8>>>,
     program: RunningProgram,
     /// Draws the output on the screen, until the program has ended.
     painter: Option<JoinHandle<()>>,
@@ -38,16 +40,19 @@ impl Terminal {
         let command = command.env(TOOL_TIMEOUT.0, TOOL_TIMEOUT.1);
         let program = command.spawn(terminal).expect("the program starts").into();
         let screen = Arc::new(Mutex::new(Parser::new(ROWS, COLUMNS, 0)));
-        let (pty, drawn) = (Arc::new(pty), Arc::clone(&screen));
-        let output = Arc::clone(&pty);
+        let output = Arc::new(Mutex::new(Vec::new()));
+        let (drawn, written) = (Arc::clone(&screen), Arc::clone(&output));
+        let pty = Arc::new(pty);
+        let source = Arc::clone(&pty);
         let painter = thread::spawn(move || {
             let mut chunk = [0; 4096];
             // A pseudo-terminal returns an error when its program has ended.
-            while let Ok(length @ 1..) = (&*output).read(&mut chunk) {
+            while let Ok(length @ 1..) = (&*source).read(&mut chunk) {
                 drawn.lock().expect("a screen").process(&chunk[..length]);
+                written.lock().expect("the output").extend_from_slice(&chunk[..length]);
             }
         });
-        Self { pty, screen, program, painter: Some(painter) }
+        Self { pty, screen, output, program, painter: Some(painter) }
     }
 
     /// Types keys.
@@ -59,6 +64,12 @@ impl Terminal {
     #[must_use]
     pub fn contents(&self) -> String {
         self.screen.lock().expect("a screen").screen().contents()
+    }
+
+    /// All bytes that the program has written.
+    #[must_use]
+    pub fn output(&self) -> Vec<u8> {
+        self.output.lock().expect("the output").clone()
     }
 
     /// True if the program draws on the alternate screen, which does not change the normal one.
@@ -92,4 +103,12 @@ impl Terminal {
         self.painter.take().map(JoinHandle::join);
         status
     }
+}
+
+/// What a terminal shows after these bytes.
+#[must_use]
+pub fn picture(output: &[u8]) -> String {
+    let mut screen = Parser::new(ROWS, COLUMNS, 0);
+    screen.process(output);
+    screen.screen().contents()
 }

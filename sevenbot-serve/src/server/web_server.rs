@@ -18,6 +18,7 @@ use hyper::upgrade::OnUpgrade;
 use hyper::{Request, Response, StatusCode};
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::service::TowerToHyperService;
+use protocol_core::time::Instant;
 use socket2::{SockRef, Socket};
 use tokio::net::{TcpListener, TcpStream};
 use tokio_rustls::TlsAcceptor;
@@ -34,7 +35,7 @@ use super::new_key::NewKey;
 use super::notice::{Notice, Notices, RefusalReason};
 use super::shared::{Shared, lock};
 use super::site::Site;
-use super::web_socket::{serve_frames, serve_maker, serve_text};
+use super::web_socket::{WebClient, serve_frames, serve_maker, serve_text};
 
 /// How long a request and its answer may take.
 const TIMEOUT: Duration = Duration::from_secs(30);
@@ -62,6 +63,8 @@ struct Upgrade {
     connection: OnUpgrade,
     protocol: Protocol,
     place: Place,
+    /// What waits behind the request was sent at this time or later.
+    since: Instant,
 }
 
 impl WebServer {
@@ -84,22 +87,22 @@ impl WebServer {
         let _ = SockRef::from(&stream).set_send_buffer_size(FILE_BUFFER);
         let Ok(socket) = SockRef::from(&stream).try_clone() else { return };
         let answered = self.admission.log_in(TIMEOUT, self.answer_request(stream, peer)).await;
-        let Some(Upgrade { connection, protocol, place }) = answered else { return };
+        let Some(Upgrade { connection, protocol, place, since }) = answered else { return };
         let Ok(connection) = connection.await else { return };
         let _ = socket.set_send_buffer_size(SEND_BUFFER);
         let Ok(breakage) = Breakage::of(&socket) else { return };
         drop::<Socket>(socket);
-        let stream = TokioIo::new(connection);
+        let client = WebClient { stream: TokioIo::new(connection), since };
         let serve = async {
             match (protocol, &self.class) {
-                (Protocol::Frames, _) => serve_frames(&self.shared, stream).await,
-                (Protocol::Maker { is_browser }, _) => serve_maker(&self.shared, stream, is_browser).await,
+                (Protocol::Frames, _) => serve_frames(&self.shared, client).await,
+                (Protocol::Maker { is_browser }, _) => serve_maker(&self.shared, client, is_browser).await,
                 (Protocol::Class(role), Some((class, new_key))) => {
                     let Some(key) = new_key() else { return };
-                    serve_text(&self.shared, stream, || ClassSession::open(class, role, key)).await;
+                    serve_text(&self.shared, client, || ClassSession::open(class, role, key)).await;
                 }
                 (Protocol::LentArm(lease), Some((class, _))) => {
-                    class.while_lent(lease, serve_frames(&self.shared, stream)).await;
+                    class.while_lent(lease, serve_frames(&self.shared, client)).await;
                 }
                 (Protocol::Class(_) | Protocol::LentArm(_), None) => {}
             }
@@ -134,6 +137,7 @@ impl WebServer {
         peer: SocketAddr,
         upgrade: &Mutex<Option<Upgrade>>,
     ) -> Response<Full<Bytes>> {
+        let since = self.shared.earliest();
         // The files are public: only what needs the token waits for it.
         if !self.site.is_public(&request) {
             self.admission.wait(Some(peer.ip())).await;
@@ -154,7 +158,7 @@ impl WebServer {
             return refusal(StatusCode::SERVICE_UNAVAILABLE, "The server has too many clients.\n");
         };
         let connection = hyper::upgrade::on(&mut request);
-        *lock(upgrade) = Some(Upgrade { connection, protocol, place });
+        *lock(upgrade) = Some(Upgrade { connection, protocol, place, since });
         response
     }
 

@@ -231,39 +231,53 @@ impl Session for MakerSession {
     }
 }
 
+/// A client of a WebSocket that was just opened.
+pub(super) struct WebClient<S> {
+    pub(super) stream: S,
+    /// What it has sent already, it sent at this time or later.
+    pub(super) since: Instant,
+}
+
 /// Serves a client whose messages carry frames.
-pub(super) async fn serve_frames<S>(shared: &Arc<Shared>, stream: S)
+pub(super) async fn serve_frames<S>(shared: &Arc<Shared>, client: WebClient<S>)
 where
     S: AsyncRead + AsyncWrite + Unpin + Send + 'static,
 {
-    serve(shared, stream, LONGEST_FRAMES, || FrameSession::open(shared)).await;
+    serve(shared, client, LONGEST_FRAMES, || FrameSession::open(shared)).await;
 }
 
 /// Serves a client of the maker's WebSocket.
-pub(super) async fn serve_maker<S>(shared: &Arc<Shared>, stream: S, is_browser: bool)
+pub(super) async fn serve_maker<S>(shared: &Arc<Shared>, client: WebClient<S>, is_browser: bool)
 where
     S: AsyncRead + AsyncWrite + Unpin + Send + 'static,
 {
-    serve(shared, stream, LONGEST_COMMAND, || MakerSession::open(shared, is_browser)).await;
+    serve(shared, client, LONGEST_COMMAND, || MakerSession::open(shared, is_browser)).await;
 }
 
 /// Serves a client whose messages are text, with a session that is opened once the WebSocket is.
-pub(super) async fn serve_text<S, T: Session>(shared: &Shared, stream: S, session: impl FnOnce() -> T)
-where
+pub(super) async fn serve_text<S, T: Session>(
+    shared: &Shared,
+    client: WebClient<S>,
+    session: impl FnOnce() -> T,
+) where
     S: AsyncRead + AsyncWrite + Unpin + Send + 'static,
 {
-    serve(shared, stream, LONGEST_COMMAND, session).await;
+    serve(shared, client, LONGEST_COMMAND, session).await;
 }
 
 /// Serves a client until it ends. `longest`: bytes of its longest message.
-async fn serve<S, T: Session>(shared: &Shared, stream: S, longest: usize, session: impl FnOnce() -> T)
-where
+async fn serve<S, T: Session>(
+    shared: &Shared,
+    client: WebClient<S>,
+    longest: usize,
+    session: impl FnOnce() -> T,
+) where
     S: AsyncRead + AsyncWrite + Unpin + Send + 'static,
 {
-    let (mut sender, mut messages) = open(stream, longest).await;
+    let (mut sender, mut messages) = open(client.stream, longest).await;
     let mut session = session();
     // When it was last seen that no message waits: what is read now was sent later.
-    let mut last_empty = shared.earliest();
+    let mut last_empty = client.since;
     let mut pace = Pace::new(shared.baud);
     let end = loop {
         if let Some(message) = session.advance(sender.is_idle()) {

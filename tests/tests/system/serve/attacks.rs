@@ -275,16 +275,20 @@ fn each_wrong_token_makes_the_next_one_wait_longer() {
     assert!(start.elapsed() >= Duration::from_millis(3_100), "{:?}", start.elapsed());
 }
 
-#[test]
-fn a_target_that_waited_for_the_check_of_its_token_is_not_carried_out() {
-    let served = Served::start(1, &["--token", "correct-horse"]);
-    let mut arm = served.open("a");
+/// Five wrong tokens: the next one of this address is checked after 1.6 s.
+fn guess_tokens(served: &Served) {
     for _ in 0..5 {
         let mut stream = served.connect();
         stream.write_all(b"battery-staple\n").expect("bytes");
         let _ = stream.read(&mut [0]);
     }
-    // The next token of this address is checked after 1.6 s.
+}
+
+#[test]
+fn a_target_that_waited_for_the_check_of_its_token_is_not_carried_out() {
+    let served = Served::start(1, &["--token", "correct-horse"]);
+    let mut arm = served.open("a");
+    guess_tokens(&served);
     let mut stream = served.connect();
     let read = read_request(DEVICE_CODE, 1);
     let sent = [b"correct-horse\n".as_slice(), &write_request(TARGET_POSITION, &[10]), &read].concat();
@@ -295,6 +299,32 @@ fn a_target_that_waited_for_the_check_of_its_token_is_not_carried_out() {
     // The program is connected, and what it sends now is carried out.
     system_tests::wait::wait_until("a new target is carried out", || {
         stream.write_all(&write_request(TARGET_POSITION, &[100])).expect("bytes");
+        target(&mut arm) == 100
+    });
+}
+
+#[test]
+fn a_command_that_waited_for_the_check_of_its_token_is_not_carried_out() {
+    let served = Served::start(1, &["--token", "correct-horse"]);
+    let mut arm = served.open("a");
+    guess_tokens(&served);
+    let mut stream = served.connect_web();
+    let request = b"GET /ws?token=correct-horse HTTP/1.1\r\nHost: localhost\r\nConnection: Upgrade\r\n\
+        Upgrade: websocket\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n";
+    let command = |degrees| format!(r#"{{"cmd":"angle","id":0,"angle":{degrees}}}"#);
+    let text = |text: &str| web_frame(0x81, text.as_bytes());
+    let read = text(r#"{"cmd":"read","id":0,"num":1}"#);
+    stream.write_all(&[request.as_slice(), &text(&command(10)), &read].concat()).expect("bytes");
+    stream.set_read_timeout(Some(Duration::from_secs(20))).expect("a timeout");
+    let mut answer = Vec::new();
+    while !answer.ends_with(b"}") {
+        let mut byte = [0];
+        stream.read_exact(&mut byte).expect("the answer to the read behind the command");
+        answer.push(byte[0]);
+    }
+    assert_eq!(target(&mut arm), 90);
+    system_tests::wait::wait_until("a new command is carried out", || {
+        stream.write_all(&text(&command(100))).expect("bytes");
         target(&mut arm) == 100
     });
 }

@@ -77,6 +77,8 @@ impl JointTruth {
         }
         if std::mem::replace(&mut self.has_power, torque.is_some()) && torque.is_none() {
             self.unpowered_at = Some(now);
+            // A servo that restarts begins without an alarm, and its joint engages at once (D28).
+            self.passing_alarm_at = None;
         }
         if !is_on {
             self.off_at = now;
@@ -199,6 +201,10 @@ mod tests {
         truth.answers(at(100), answer(error::OVERLOAD | error::OVERHEAT));
         truth.answers(at(200), answer(error::OVERLOAD));
         assert!(!truth.is_calm(at(499)) && truth.is_calm(at(500)));
+        truth.observe(at(600), OFF, false);
+        truth.answers(at(600), answer(error::OVERHEAT));
+        truth.observe(at(610), None, false);
+        assert!(truth.is_calm(at(610)), "it restarts");
     }
 
     #[test]

@@ -17,6 +17,8 @@ const LOST_AFTER: Duration = Duration::from_millis(900);
 const NOTICE_TIME: Duration = Duration::from_millis(3_000);
 /// A joint is let go once its torque was read off this often: one reading may be false.
 const LOST_BY: u8 = 2;
+/// Goals that are sent after an answer that took this long may be from before it: they are calculated in each control cycle.
+const LATE: Duration = Duration::from_millis(10);
 /// The registers of a reading.
 const READING: usize = 8;
 
@@ -54,6 +56,8 @@ struct Known {
     held_goal: Option<u16>,
     /// In counts.
     position: Option<u16>,
+    /// The position before a late answer.
+    position_before: Option<u16>,
 }
 
 /// What is known of all servos.
@@ -124,6 +128,12 @@ impl ServoReplies {
     /// The last measured position, in counts.
     pub(super) fn position(&self, joint: Joint) -> Option<u16> {
         self.servos[joint].position
+    }
+
+    /// The measured positions from which the next goal may be calculated: the last one, and the one before a late answer.
+    pub(super) fn positions(&self, joint: Joint) -> impl Iterator<Item = u16> {
+        let servo = self.servos[joint];
+        [servo.position, servo.position_before].into_iter().flatten()
     }
 
     /// The goal that the servo held with torque when its torque was read last, in counts.
@@ -211,6 +221,7 @@ impl Known {
             self.silence = (since, now);
         }
         if let Some(&[high, low, ..]) = measurements(params) {
+            self.position_before = self.position.filter(|_| now - self.asked_at > LATE);
             self.position = Some(u16::from_be_bytes([high, low]));
         }
         if let Some(code) = torque_switch(params) {

@@ -7,7 +7,7 @@ use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use system_tests::terminal::Terminal;
+use system_tests::terminal::{Terminal, picture};
 use tempfile::TempDir;
 
 use crate::dist::contents::archive_name;
@@ -119,10 +119,12 @@ impl Wine {
         let mut words: Vec<&str> = variables.iter().map(String::as_str).collect();
         words.extend(["wine", &program, "--port", port, "monitor"]);
         let mut terminal = Terminal::run(Path::new("env"), &words);
-        let picture = terminal.wait_until("the joints", |screen| {
-            screen.contains("joint  target  position") && screen.matches('●').count() == JOINTS
-        });
-        println!("{picture}");
+        let drawn = wait_for("the joints on the screen", || {
+            let drawn = picture(&without_console(terminal.output()));
+            let has_joints = drawn.contains("joint  target  position") && drawn.matches('●').count() == JOINTS;
+            Ok(has_joints.then_some(drawn))
+        })?;
+        println!("{drawn}");
         terminal.keys("q");
         if terminal.wait().success() { Ok(()) } else { Err("the monitor failed".into()) }
     }
@@ -136,6 +138,17 @@ impl Wine {
         let _ = fs::remove_file(&link);
         Ok(symlink(terminal, link)?)
     }
+}
+
+/// The output of a program without what the console of Wine 8 adds. It takes escape sequences for text, so it begins a new line
+/// after each 80 characters, and sometimes puts its own cursor back.
+fn without_console(mut output: Vec<u8>) -> Vec<u8> {
+    for added in [b"\r\r\n".as_slice(), b"\x1b[K\x1b[?25h\x1b[?25l"] {
+        while let Some(at) = output.windows(added.len()).position(|bytes| bytes == added) {
+            output.drain(at..at + added.len());
+        }
+    }
+    output
 }
 
 /// The simulator of the release on this computer, and its port.

@@ -102,8 +102,8 @@ impl CommandChecker {
         context: &CommandContext<'_>,
     ) -> bool {
         let speed = context.registers.get(SPEED.of(joint));
-        let reached = |position| before.giving_way(position).after(joint, goal, speed, context.now);
-        let is_nearer = self.replies.position(joint).and_then(reached).is_some();
+        let reached = |position| before.giving_way(position).after(joint, goal, speed, context.now).is_some();
+        let is_nearer = self.replies.positions(joint).any(reached);
         is_nearer && context.bus.truth(joint).may_give_way(context.now)
     }
 }
