@@ -18,7 +18,7 @@
 //!
 //! let now = Instant::ZERO;
 //! let mut class = Classroom::new(ClassInfo::default());
-//! let (mia, teacher) = (class.open_pupil("a random key".to_owned()), class.open_teacher());
+//! let (mia, teacher) = (class.open_pupil(now, "a random key".to_owned()), class.open_teacher());
 //! class.receive(now, mia, r#"{"join": {"name": "Mia", "key": null}}"#);
 //! assert!(class.next_message(now, mia).is_some_and(|text| text.starts_with(r#"{"welcome":{"name":"Mia""#)));
 //!

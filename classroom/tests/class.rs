@@ -44,7 +44,7 @@ impl Lesson {
 
     fn open(&mut self) -> ConnectionId {
         self.keys += 1;
-        self.class.open_pupil(format!("key {}", self.keys))
+        self.class.open_pupil(self.now, format!("key {}", self.keys))
     }
 
     fn say(&mut self, id: ConnectionId, message: &FromPupil) {
@@ -161,6 +161,20 @@ fn bad_messages_and_names_end_the_connection() {
     let mut lesson = Lesson::new(false);
     let nameless = lesson.join_with(" \u{200b}-", None);
     assert_eq!(lesson.hear_all(nameless), [ToPupil::Refused(Refusal::NoName)]);
+}
+
+#[test]
+fn who_does_not_say_a_name_for_ten_seconds_makes_room() {
+    let mut lesson = Lesson::new(false);
+    let strangers: Vec<_> = (0..MOST_PUPILS).map(|_| lesson.open()).collect();
+    let mia = lesson.join_with("Mia", None);
+    assert_eq!(lesson.hear_all(mia), [ToPupil::Refused(Refusal::Full)]);
+    lesson.pass(9_999);
+    assert_eq!(lesson.hear_all(strangers[0]), []);
+    lesson.pass(1);
+    assert_eq!(lesson.hear_all(strangers[0]), [ToPupil::Refused(Refusal::BadMessage)]);
+    assert!(lesson.class.is_over(strangers[0]));
+    assert_eq!(lesson.join("Mia").1, "Mia");
 }
 
 #[test]

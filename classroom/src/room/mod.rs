@@ -24,6 +24,8 @@ use crate::stop_all::StopAll;
 pub const MOST_PUPILS: usize = 64;
 /// Teacher's screens: the one on the desk, and that of the beamer.
 const MOST_TEACHERS: usize = 4;
+/// A tab says who it is within this time, or its connection ends.
+const JOIN_TIME: Duration = Duration::from_millis(10_000);
 /// A pupil whose connection was lost is shown for this long, and has its name for this long.
 const LOST_KEPT: Duration = Duration::from_millis(120_000);
 
@@ -44,8 +46,11 @@ pub struct LeaseId(u32);
 
 #[derive(Debug)]
 enum Connection {
-    /// It has not said who it is. If it becomes a pupil, this is its key.
-    Stranger(String),
+    /// It has not said who it is since it was opened. If it becomes a pupil, this is its key.
+    Stranger {
+        key: String,
+        since: Instant,
+    },
     Pupil(u32),
     Teacher(Desk),
     /// It is told why, and then closed.
@@ -92,12 +97,13 @@ impl Classroom {
     }
 
     /// A tab of a pupil connects. `key` is a new secret: who knows it is this pupil.
-    pub fn open_pupil(&mut self, key: String) -> ConnectionId {
-        let pupils =
-            |connection: &&Connection| matches!(connection, Connection::Stranger(_) | Connection::Pupil(_));
+    pub fn open_pupil(&mut self, now: Instant, key: String) -> ConnectionId {
+        let pupils = |connection: &&Connection| {
+            matches!(connection, Connection::Stranger { .. } | Connection::Pupil(_))
+        };
         let is_full = self.connections.values().filter(pupils).count() >= MOST_PUPILS;
         let refused = Connection::Refused(Some(Refused::Pupil(Refusal::Full)));
-        self.open(if is_full { refused } else { Connection::Stranger(key) })
+        self.open(if is_full { refused } else { Connection::Stranger { key, since: now } })
     }
 
     /// A teacher's screen connects.
@@ -129,7 +135,7 @@ impl Classroom {
     pub fn receive(&mut self, now: Instant, id: ConnectionId, text: &str) {
         let Some(connection) = self.connections.get(&id) else { return };
         let is_taken = match connection {
-            Connection::Stranger(key) => match serde_json::from_str(text) {
+            Connection::Stranger { key, .. } => match serde_json::from_str(text) {
                 Ok(FromPupil::Join { name, key: known }) => {
                     let key = key.clone();
                     self.join(now, id, &name, key, known.as_deref());
@@ -196,6 +202,11 @@ impl Classroom {
     /// Time passes. Call it each 50 ms or so.
     pub fn poll(&mut self, now: Instant) {
         self.pupils.values_mut().for_each(|pupil| pupil.poll(now));
+        for connection in self.connections.values_mut() {
+            if matches!(connection, Connection::Stranger { since, .. } if now - *since >= JOIN_TIME) {
+                *connection = Connection::Refused(Some(Refused::Pupil(Refusal::BadMessage)));
+            }
+        }
         let Some(lease) = self.lease_now() else { return self.forget_lost(now) };
         let holder = self.pupils.get(&lease.pupil);
         if lease.is_over(now) {

@@ -11,7 +11,7 @@ impl Classroom {
     /// The connections that have a message.
     pub fn ready(&self, now: Instant) -> impl Iterator<Item = ConnectionId> {
         let has_message = move |connection: &Connection| match connection {
-            Connection::Stranger(_) => false,
+            Connection::Stranger { .. } => false,
             Connection::Pupil(number) => {
                 self.pupils.get(number).is_some_and(|pupil| pupil.has_message(now, self.message.0))
             }
@@ -25,7 +25,7 @@ impl Classroom {
     pub fn next_message(&mut self, now: Instant, id: ConnectionId) -> Option<String> {
         let mut connection = self.connections.remove(&id)?;
         let message = match &mut connection {
-            Connection::Stranger(_) => None,
+            Connection::Stranger { .. } => None,
             Connection::Pupil(number) => self.for_pupil(now, *number),
             Connection::Teacher(desk) => desk
                 .next_message(now, self.change, || self.welcome(), || ToTeacher::Class(self.class(now)))

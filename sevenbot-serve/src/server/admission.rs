@@ -24,11 +24,28 @@ const MOST_ADDRESSES: usize = 256;
 /// A place of a client, or of any connection.
 pub(super) type Place = OwnedSemaphorePermit;
 
+/// How many places there are.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Places {
+    pub(super) clients: usize,
+    /// For clients that the others must not keep out.
+    pub(super) reserved: usize,
+    /// For connections that have not shown a token, or get a file.
+    pub(super) unknown: usize,
+}
+
+impl Places {
+    pub(super) const fn sum(self) -> usize {
+        self.clients + self.reserved + self.unknown
+    }
+}
+
 /// The places.
 #[derive(Debug)]
 pub(super) struct Admission {
     connections: Arc<Semaphore>,
     clients: Arc<Semaphore>,
+    reserved: Arc<Semaphore>,
     unknown: Mutex<VecDeque<Arc<Notify>>>,
     most_unknown: usize,
     wrong: Mutex<BTreeMap<IpAddr, WrongTokens>>,
@@ -45,14 +62,15 @@ impl Admission {
     /// Places for so many clients, and for as many connections that have not shown their token: all programs of a server may come
     /// back at once.
     pub(super) fn new(most: usize) -> Arc<Self> {
-        Self::with_unknown(most, most)
+        Self::with(Places { clients: most, reserved: 0, unknown: most })
     }
 
-    /// Places for so many clients, and for so many connections that have not shown a token, or get a file.
-    pub(super) fn with_unknown(most: usize, most_unknown: usize) -> Arc<Self> {
+    pub(super) fn with(places: Places) -> Arc<Self> {
+        let Places { clients, reserved, unknown: most_unknown } = places;
         Arc::new(Self {
-            connections: Arc::new(Semaphore::new(most + most_unknown + WAYS_IN)),
-            clients: Arc::new(Semaphore::new(most)),
+            connections: Arc::new(Semaphore::new(places.sum() + WAYS_IN)),
+            clients: Arc::new(Semaphore::new(clients)),
+            reserved: Arc::new(Semaphore::new(reserved)),
             unknown: Mutex::default(),
             most_unknown,
             wrong: Mutex::default(),
@@ -92,6 +110,11 @@ impl Admission {
     /// A place for a client; `None` if all are taken.
     pub(super) fn place(&self) -> Option<Place> {
         Arc::clone(&self.clients).try_acquire_owned().ok()
+    }
+
+    /// A reserved place; `None` if all are taken.
+    pub(super) fn reserved_place(&self) -> Option<Place> {
+        Arc::clone(&self.reserved).try_acquire_owned().ok()
     }
 
     /// Waits as long as the wrong tokens of this address make it wait.

@@ -36,6 +36,13 @@ pub(super) enum Protocol {
     LentArm(LeaseId),
 }
 
+impl Protocol {
+    /// The teacher, and the pupil with the arm, are let in however many tabs there are.
+    pub(super) const fn has_reserved_place(self) -> bool {
+        matches!(self, Self::Class(Role::Teacher) | Self::LentArm(_))
+    }
+}
+
 /// The answer to a request.
 #[derive(Debug)]
 pub(super) enum Answer {

@@ -24,8 +24,8 @@ pub(super) struct ClassSession {
 impl ClassSession {
     /// `key`: a new secret, for a pupil.
     pub(super) fn open(class: &Arc<Class>, role: Role, key: String) -> Self {
-        let id = class.with(|room, _| match role {
-            Role::Pupil => room.open_pupil(key),
+        let id = class.with(|room, now| match role {
+            Role::Pupil => room.open_pupil(now, key),
             Role::Teacher => room.open_teacher(),
         });
         Self { class: Arc::clone(class), id, wake: class.join(id), is_closing: false }

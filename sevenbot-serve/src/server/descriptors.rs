@@ -1,30 +1,65 @@
 //! File descriptors: connections leave enough of them for the arm's port, which is opened again after each outage.
 
+use super::admission::Places;
+
 /// Connections of each kind, if there are enough descriptors: programs over the network, connections that have not shown their
 /// token, and programs at the Unix socket.
 const MOST: usize = 64;
 /// Descriptors that one of each kind takes: over the network the socket and its [`super::breakage::Breakage`].
-#[cfg(unix)]
 const OF_EACH_KIND: usize = 2 + 2 + 1;
 /// For the arm's port, for files, and for connections that are accepted only to be closed.
 #[cfg(unix)]
 const RESERVED: usize = 16;
 
-/// How many connections of each kind the server may have. Call it when all listeners are open, and the arm's port is not.
+/// Descriptors that a class with all its tabs may take. Some systems allow a process 256, and more if it asks.
 #[cfg(unix)]
-pub(super) fn connections() -> usize {
-    use rustix::process::{Resource, getrlimit};
-    let Some(limit) = getrlimit(Resource::Nofile).current.and_then(|limit| usize::try_from(limit).ok())
-    else {
-        return MOST;
-    };
-    // Where the system does not list them, those of a server with many ways in.
-    let open = std::fs::read_dir("/dev/fd").map_or(RESERVED, Iterator::count);
-    (limit.saturating_sub(open + RESERVED) / OF_EACH_KIND).clamp(1, MOST)
+const WANTED: u64 = 2_048;
+/// Descriptors of a connection over the network.
+const OF_CONNECTION: usize = 2;
+
+/// Asks the system for more descriptors. If it gives none, there are fewer places.
+#[cfg(unix)]
+pub(super) fn ask_for_more() {
+    use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
+    let limit = getrlimit(Resource::Nofile);
+    let wanted = limit.maximum.map_or(WANTED, |maximum| maximum.min(WANTED));
+    if limit.current.is_some_and(|current| current < wanted) {
+        let _ = setrlimit(Resource::Nofile, Rlimit { current: Some(wanted), ..limit });
+    }
 }
 
 /// Windows has no such limit.
 #[cfg(not(unix))]
-pub(super) const fn connections() -> usize {
-    MOST
+pub(super) const fn ask_for_more() {}
+
+/// How many connections of each kind the server may have. Call it when all listeners are open, and the arm's port is not.
+pub(super) fn connections() -> usize {
+    (free() / OF_EACH_KIND).clamp(1, MOST)
+}
+
+/// As many of these places of a class as the descriptors are enough for, beside the programs at the Unix socket.
+pub(super) fn fitting(places: Places) -> Places {
+    let most = free().saturating_sub(connections()) / OF_CONNECTION;
+    let clients = places.clients.min(most / 2).max(1);
+    let unknown = places.unknown.min(most.saturating_sub(clients + places.reserved)).max(1);
+    Places { clients, unknown, ..places }
+}
+
+/// Descriptors that are free for connections.
+#[cfg(unix)]
+fn free() -> usize {
+    use rustix::process::{Resource, getrlimit};
+    let Some(limit) = getrlimit(Resource::Nofile).current.and_then(|limit| usize::try_from(limit).ok())
+    else {
+        return usize::MAX;
+    };
+    // Where the system does not list them, those of a server with many ways in.
+    let open = std::fs::read_dir("/dev/fd").map_or(RESERVED, Iterator::count);
+    limit.saturating_sub(open + RESERVED)
+}
+
+/// Windows has no such limit.
+#[cfg(not(unix))]
+const fn free() -> usize {
+    usize::MAX
 }

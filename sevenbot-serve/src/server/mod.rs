@@ -201,6 +201,7 @@ impl Server {
             }
             let network =
                 Network { shared, notices: Notices(refusals), tls: tls.map(|TlsSettings(tls)| tls) };
+            descriptors::ask_for_more();
             network.spawn_class(&config, class);
             network.spawn(&config, socket, tcp, web_socket, page);
             let mut next_refusal = tokio::time::Instant::now();

@@ -6,7 +6,7 @@ use classroom::{ClassInfo, Classroom, MOST_PUPILS};
 use tokio::net::TcpListener;
 use tokio_rustls::TlsAcceptor;
 
-use super::admission::Admission;
+use super::admission::{Admission, Places};
 use super::byte_server::ByteServer;
 use super::class::Class;
 use super::class_site::{self, ClassSite};
@@ -23,8 +23,16 @@ use super::web_server::WebServer;
 
 /// Connections with which a browser loads the page. A class opens it all at once.
 const FILES_OF_EACH_TAB: usize = 4;
+/// Tabs that are being told why they are refused.
+const REFUSED_TABS: usize = 8;
 /// Teacher's screens, and sessions with the arm of a class.
 const OTHER_TABS: usize = 8;
+/// The places of a class.
+const PLACES: Places = Places {
+    clients: MOST_PUPILS + REFUSED_TABS,
+    reserved: OTHER_TABS,
+    unknown: FILES_OF_EACH_TAB * MOST_PUPILS,
+};
 
 /// What the connections of the network share.
 pub(super) struct Network {
@@ -67,7 +75,7 @@ impl Network {
         }
     }
 
-    /// Serves the class, if there is one. It has places for teacher's screens and the arm beside those of the pupils.
+    /// Serves the class, if there is one.
     pub(super) fn spawn_class(&self, config: &ServerConfig, listener: Option<TcpListener>) {
         let (Some(listener), Some(settings)) = (listener, config.class.clone()) else { return };
         let ClassConfig { files, code, secret, hosts, new_key, .. } = settings;
@@ -78,9 +86,7 @@ impl Network {
         let class = Class::new(Arc::clone(&self.shared), Classroom::new(info));
         tokio::spawn(Arc::clone(&class).run());
         let site = Site::Class(ClassSite { files, code, secret, class: Arc::clone(&class), is_encrypted });
-        let admission =
-            Admission::with_unknown(MOST_PUPILS + OTHER_TABS, FILES_OF_EACH_TAB * descriptors::connections());
-        let server = self.web(site, self.tls.clone(), &admission);
+        let server = self.web(site, self.tls.clone(), &Admission::with(descriptors::fitting(PLACES)));
         tokio::spawn(WebServer { class: Some((class, new_key)), ..server }.serve(listener));
     }
 

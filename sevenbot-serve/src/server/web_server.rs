@@ -153,7 +153,12 @@ impl WebServer {
             Answer::Upgrade(response, protocol) => (response, protocol),
         };
         self.admission.note(Some(peer.ip()), true);
-        let Some(place) = self.admission.place() else {
+        let place = if protocol.has_reserved_place() {
+            self.admission.reserved_place()
+        } else {
+            self.admission.place()
+        };
+        let Some(place) = place else {
             self.refused(peer, RefusalReason::Full);
             return refusal(StatusCode::SERVICE_UNAVAILABLE, "The server has too many clients.\n");
         };

@@ -8,7 +8,7 @@ use std::{io, mem};
 
 use futures_util::stream::{SplitSink, SplitStream};
 use futures_util::{FutureExt, SinkExt, StreamExt};
-use protocol_core::time::Instant;
+use protocol_core::time::{Duration, Instant};
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio_tungstenite::WebSocketStream;
 use tungstenite::protocol::{Role, WebSocketConfig};
@@ -24,6 +24,8 @@ use crate::maker::MakerClient;
 const LONGEST_FRAMES: usize = 4_096;
 /// The longest message of the maker's programs, as in the maker's firmware.
 const LONGEST_COMMAND: usize = 2_048;
+/// A client that is told to close its connection has so long. Then the server does.
+const CLOSE_TIMEOUT: Duration = Duration::from_millis(1_000);
 /// Bytes that a client may send without a whole message among them: fragments without end fill no memory, but cost time.
 const MOST_UNFINISHED: usize = 32 * 1_024;
 
@@ -279,8 +281,12 @@ async fn serve<S, T: Session>(
     // When it was last seen that no message waits: what is read now was sent later.
     let mut last_empty = client.since;
     let mut pace = Pace::new(shared.baud);
+    let mut end_at = Instant::FAR_FUTURE;
     let end = loop {
         if let Some(message) = session.advance(sender.is_idle()) {
+            if message.is_close() {
+                end_at = shared.now() + CLOSE_TIMEOUT;
+            }
             sender.start(message);
         }
         let has_room = session.has_room();
@@ -309,6 +315,7 @@ async fn serve<S, T: Session>(
             sent = sender.done() => if let Err(end) = sent { break end },
             () = shared.sleep_until(pace.free_at()), if has_room && !waits_for_input => {}
             () = session.news() => {}
+            () = shared.sleep_until(end_at) => break End::Broken,
         }
         if waits_for_input {
             last_empty = shared.earliest();

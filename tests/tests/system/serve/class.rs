@@ -136,6 +136,21 @@ fn a_whole_class_can_load_the_page_at_once() {
     assert!(lengths[0] > 500_000 && lengths.iter().all(|length| *length == lengths[0]), "{lengths:?}");
 }
 
+/// Nobody of these says a name, nor closes its connection when it is told to.
+#[test]
+fn strangers_keep_neither_the_teacher_nor_the_class_out() {
+    let class = Class::start(false, "robots7");
+    let strangers: Vec<_> = (0..100).filter_map(|_| class.socket("/class?token=robots7", &[]).ok()).collect();
+    assert!(strangers.len() >= 64, "{} strangers", strangers.len());
+    let mut teacher = class.teacher();
+    shown(&mut teacher, |class| class["pupils"] == json!([]));
+    // Their connections end after ten seconds, and one more as they do not close them.
+    let mut mia = wait_for("a place", || class.try_join("Mia").ok_or_else(|| "the class is full".to_owned()));
+    mia.tab.hear("ask");
+    shown(&mut teacher, |class| tile(class, "Mia")["presence"] == "here");
+    drop(strangers);
+}
+
 #[test]
 fn pupils_have_names_of_their_own_and_come_back_with_their_keys() {
     let class = Class::start(false, "");

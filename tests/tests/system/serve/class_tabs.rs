@@ -104,8 +104,15 @@ impl Class {
         let mut tab = self.tab();
         tab.say(&json!({ "join": { "name": name, "key": key } }));
         let welcome = tab.hear("welcome");
-        let text = |name: &str| welcome[name].as_str().expect("a text").to_owned();
-        Pupil { name: text("name"), key: text("key"), tab }
+        Pupil::new(tab, &welcome)
+    }
+
+    /// A pupil, if the class has a place.
+    pub(crate) fn try_join(&self, name: &str) -> Option<Pupil> {
+        let tab = Tab::new(self.socket(&format!("/class?token={}", self.code), &[]).ok()?);
+        tab.say(&json!({ "join": { "name": name, "key": null } }));
+        let answer = wait_for("an answer", || tab.heard.try_recv().map_err(|error| error.to_string()));
+        answer.get("welcome").map(|welcome| Pupil::new(tab, welcome))
     }
 
     pub(crate) fn teacher(&self) -> Tab {
@@ -123,6 +130,13 @@ pub(crate) struct Pupil {
     pub(crate) name: String,
     pub(crate) key: String,
     pub(crate) tab: Tab,
+}
+
+impl Pupil {
+    fn new(tab: Tab, welcome: &Value) -> Self {
+        let text = |name: &str| welcome[name].as_str().expect("a text").to_owned();
+        Self { name: text("name"), key: text("key"), tab }
+    }
 }
 
 /// A tab. A thread answers the questions of the class as soon as they come.

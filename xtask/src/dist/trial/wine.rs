@@ -121,7 +121,8 @@ impl Wine {
         let mut terminal = Terminal::run(Path::new("env"), &words);
         let drawn = wait_for("the joints on the screen", || {
             let drawn = picture(&without_console(terminal.output()));
-            let has_joints = drawn.contains("joint  target  position") && drawn.matches('●').count() == JOINTS;
+            let has_joints =
+                drawn.contains("joint  target  position") && drawn.matches('●').count() == JOINTS;
             Ok(has_joints.then_some(drawn))
         })?;
         println!("{drawn}");
