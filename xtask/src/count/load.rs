@@ -37,8 +37,25 @@ const STEP: u16 = 30;
 /// transmitter is always empty, so that one interrupt sends up to eight bytes.
 const PER_BYTE_SENT: u64 = 59 + 38;
 
+/// On a busy computer the image may miss ticks, and then it does less.
+const ATTEMPTS: usize = 4;
+
 /// The load as one figure. The part of the sent bytes is computed, the rest is counted.
 pub(super) fn figure() -> TaskResult<Figure> {
+    for _ in 0..ATTEMPTS {
+        let (steps, reported) = count()?;
+        // The first and the last report may be cut.
+        if reported / REPORT_BYTES >= usize::from(REPORT_HZ) - 1 {
+            let what = "image: one second of 200 frames of 7 fine targets and 50 long reports";
+            return Ok(Figure::new(what, steps));
+        }
+        println!("the image sent {reported} bytes of reports in a second: once more");
+    }
+    Err(format!("the image sent fewer reports in each of {ATTEMPTS} seconds").into())
+}
+
+/// Instructions and bytes of reports in a second.
+fn count() -> TaskResult<(u64, usize)> {
     let mut plant = Plant::new(Instant::ZERO);
     plant.ignore_collisions();
     let mut image = Lockstep::start(plant)?;
@@ -63,11 +80,7 @@ pub(super) fn figure() -> TaskResult<Figure> {
             steps += PER_BYTE_SENT * (sent.to_host + sent.to_servos) as u64;
         }
     }
-    // The first and the last report may be cut.
-    if reported / REPORT_BYTES < usize::from(REPORT_HZ) - 1 {
-        Err(format!("the image sent {reported} bytes of reports in a second"))?;
-    }
-    Ok(Figure::new("image: one second of 200 frames of 7 fine targets and 50 long reports", steps))
+    Ok((steps, reported))
 }
 
 /// A triangle of 120 steps around the middle.
