@@ -16,10 +16,13 @@ use crate::status_block::StatusBlock;
 use host_link::{Snapshot, Span};
 
 mod cause;
+mod server;
+mod server_reason;
 
 pub use cause::MismatchCause;
 pub(crate) use cause::cause_from_counters;
 use cause::{cause_from_access, cause_from_arm, cause_from_range};
+pub use server_reason::ServerReason;
 
 /// A register that does not hold what was written to it.
 ///
@@ -220,7 +223,7 @@ impl Arm {
             }
             (before, sending) = (after, lost);
         }
-        Ok(NotTaken::check(unchanged)?)
+        NotTaken::check(unchanged).map_err(|lost| self.explained_by_server(lost).into())
     }
 
     /// The write that starts the reports of map 2.2 again, if these writes end them.

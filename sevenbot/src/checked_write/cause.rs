@@ -6,6 +6,7 @@ use protocol_core::registers::map::{LIMITS, PRESENT_POSITION, refusal};
 use protocol_core::registers::map21::find_readable;
 use protocol_core::registers::{Access, Region, Register};
 
+use super::server_reason::ServerReason;
 use crate::map_view::MapView;
 use crate::names::name_of_register;
 use crate::register_text;
@@ -57,6 +58,8 @@ pub enum MismatchCause {
     Restarted,
     /// The arm received the frame damaged.
     Damaged,
+    /// A server between did not pass the frame on.
+    NotPassedOn(ServerReason),
     /// The arm gives no reason: the frame was lost, or the register has changed since.
     Unknown,
 }
@@ -144,6 +147,7 @@ impl fmt::Display for MismatchCause {
             Self::StorageFull => out.write_str("the settings storage is full until the arm restarts"),
             Self::Restarted => out.write_str("the controller restarted, and has the values of its start"),
             Self::Damaged => out.write_str("the arm received the request damaged; try again"),
+            Self::NotPassedOn(reason) => reason.fmt(out),
             Self::Unknown => out.write_str("the arm gives no reason; try again"),
         }
     }

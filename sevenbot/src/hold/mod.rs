@@ -80,7 +80,7 @@ impl Arm {
                 HoldStep::Holds(joints) | HoldStep::NotDriven(joints) => {
                     return Ok((joints, hold.has_restarted));
                 }
-                HoldStep::NotTaken(lost) => return Err(lost.into()),
+                HoldStep::NotTaken(lost) => return Err(self.explained_by_server(lost).into()),
             }
         }
     }

@@ -6,6 +6,7 @@ use std::os::unix::fs::PermissionsExt;
 use std::os::unix::net::UnixStream;
 use std::process::Output;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -372,6 +373,29 @@ fn with_one_driver_others_are_told_that_they_only_watch() {
     assert_eq!((second.register(STATE), second.register(DRIVEN_BY)), (4, 2));
     assert_eq!(target(&mut second), 100);
     assert_eq!(second.read(PRESENT_POSITION, 7).len(), 7, "it reads");
+}
+
+#[test]
+fn a_command_that_the_server_does_not_pass_on_tells_why() {
+    let cases =
+        [("--read-only", false, "started with --read-only"), ("--one-driver", true, "another one does now")];
+    for (option, has_driver, why) in cases {
+        let served = Served::start(2, &[option]);
+        let mut driver = served.open("a");
+        let (stop, stopped) = channel::<()>();
+        driver.write(TARGET_POSITION, &[100]);
+        assert_eq!(target(&mut driver) == 100, has_driver);
+        let driving = thread::spawn(move || {
+            while stopped.recv_timeout(Duration::from_millis(100)) == Err(RecvTimeoutError::Timeout) {
+                driver.write(TARGET_POSITION, &[100]);
+            }
+        });
+        let done = run(&served, "./b", &["set", "target-position.1", "120"]);
+        let said = String::from_utf8_lossy(&done.stderr);
+        assert!(!done.status.success() && said.contains(why), "{option}: {done:?}");
+        drop(stop);
+        driving.join().expect("it drives");
+    }
 }
 
 /// What waits for a server that does not run is as old as it is.
