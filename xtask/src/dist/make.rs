@@ -2,6 +2,7 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::thread;
 
 use rustix::fs::Mode;
 use rustix::process::umask;
@@ -23,6 +24,8 @@ pub(super) fn make(folder: PathBuf) -> TaskResult {
     empty(&release.folder)?;
     println!("{}", release.text());
     timed("tools", || tools::python().map(drop))?;
+    // Its build fills the time in which a single processor links.
+    let cyclonedx = thread::spawn(|| tools::cyclonedx().map(drop).map_err(|why| why.to_string()));
     timed("page", || {
         page::build(&release)?;
         page::write(&release)
@@ -44,6 +47,7 @@ pub(super) fn make(folder: PathBuf) -> TaskResult {
     }
     timed("Python packages", || wheels::write(&release))?;
     timed("firmware", || firmware::write(&release))?;
+    cyclonedx.join().map_err(|_| "the build of cargo-cyclonedx panicked")??;
     timed("lists of parts", || sbom::write(&release))?;
     fs::write(release.path(&licences_name(&release)), licences)?;
     finish(&release)?;

@@ -99,6 +99,9 @@ pub(super) fn reproducible(command: &mut Command, release: &Release, triple: &st
     if triple == WINDOWS.triple {
         all.push_str(" -Clink-arg=-Wl,--no-insert-timestamp");
     }
+    if PLATFORMS.iter().any(|platform| platform.triple == triple && platform.debian.is_some()) {
+        tools::use_zig(command, triple, GLIBC)?;
+    }
     command
         .env(format!("CARGO_TARGET_{name}_RUSTFLAGS"), all)
         .env("CARGO_TARGET_DIR", build_directory())

@@ -2,6 +2,8 @@
 
 use std::env;
 use std::ffi::OsString;
+use std::fs::{self, Permissions};
+use std::os::unix::fs::PermissionsExt;
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
@@ -36,6 +38,26 @@ pub(super) fn cargo_with_zig(subcommand: &str) -> TaskResult<Command> {
     let mut command = Command::new(python()?.with_file_name("cargo-zigbuild"));
     command.arg(subcommand).env("PATH", search_path()?);
     Ok(command)
+}
+
+/// Makes zig the compiler and the linker of a Linux target for programs with `glibc`. `cargo-zigbuild` and maturin would each call
+/// it by a path of their own, and cargo would build all crates again for the other path.
+pub(super) fn use_zig(command: &mut Command, triple: &str, glibc: &str) -> TaskResult {
+    let (target, variable) = (triple.replace("-unknown", ""), triple.replace('-', "_"));
+    let compiler = format!("zig cc -- -g -fno-sanitize=all -target {target}.{glibc}");
+    let compiler = zig_script(&format!("zigcc-{triple}"), &compiler)?;
+    command.env(format!("CARGO_TARGET_{}_LINKER", variable.to_uppercase()), &compiler);
+    command.env(format!("CC_{variable}"), compiler);
+    command.env(format!("AR_{variable}"), zig_script("zigar", "zig ar")?);
+    Ok(())
+}
+
+/// A program that calls `cargo-zigbuild` with these words, and then with its own arguments.
+fn zig_script(name: &str, words: &str) -> TaskResult<PathBuf> {
+    let (script, zigbuild) = (folder().join(name), python()?.with_file_name("cargo-zigbuild"));
+    fs::write(&script, format!("#!/bin/sh\nexec {} {words} \"$@\"\n", zigbuild.display()))?;
+    fs::set_permissions(&script, Permissions::from_mode(0o755))?;
+    Ok(script)
 }
 
 /// `cargo-cyclonedx`, built without optimisation: that is sooner done.
