@@ -243,6 +243,22 @@ fn a_hold_under_way_does_not_overwrite_a_stop_that_comes_meanwhile() {
     }
 }
 
+/// A joint that got a target soon after power-up moves as soon as it is measured. Until then there is nothing to hold it at.
+#[test]
+fn a_command_stops_an_arm_that_was_just_switched_on() {
+    for delay in (50..300).step_by(10) {
+        let mut world = World::new(2);
+        world.power_cycle();
+        world.run(delay);
+        world.send(0, &write(TARGET_POSITION.address, &[150]));
+        world.run(20);
+        world.send(1, &write(COMMAND, &[1]));
+        world.run(2_000);
+        let held = world.arm.registers().get(TARGET_POSITION.address);
+        assert!(held < 145, "{delay} ms after power-up: on its way to {held}");
+    }
+}
+
 /// Each command begins another hold before the one before has ended.
 #[test]
 fn commands_without_a_pause_stop_the_arm() {

@@ -19,6 +19,9 @@ use super::held_targets::{HeldTargets, Targets};
 
 /// Reads and writes are repeated this often.
 const MOST_ROUNDS: u8 = 5;
+/// A hold is repeated this often until each joint whose set-point moves was measured: for 0.2 s or more. It takes
+/// 0.2 s after power-up.
+const MOST_REPEATS: u8 = 40;
 /// The value of a fine position that was not measured.
 const UNMEASURED: u16 = u16::MAX;
 /// Hundredths of a degree in a register of one byte.
@@ -40,6 +43,7 @@ pub(crate) struct ArmHold {
     driven: u8,
     /// A joint whose set-point moves was not measured yet: it goes on once it is.
     has_unmeasured: bool,
+    repeats: u8,
     rounds: u8,
     sent: Vec<Frame>,
     /// Joints that a client held after the last read was sent, one bit each.
@@ -63,6 +67,7 @@ impl ArmHold {
             moving,
             driven: 0,
             has_unmeasured: false,
+            repeats: MOST_REPEATS,
             rounds: 0,
             sent: Vec::new(),
             held_meanwhile: 0,
@@ -80,6 +85,12 @@ impl ArmHold {
     /// Has another hold to follow?
     pub(crate) const fn is_wanted_again(&self) -> bool {
         self.is_wanted_again
+    }
+
+    /// The hold that follows this one because a joint whose set-point moves was not measured yet.
+    pub(crate) fn for_unmeasured(&self) -> Option<Self> {
+        let repeats = self.repeats.checked_sub(1).filter(|_| self.has_unmeasured)?;
+        Some(Self { repeats, ..Self::new(self.is_fine, self.is_streaming) })
     }
 
     /// A client holds the joints that have a target here: what was read of them before is out of date.
@@ -251,6 +262,13 @@ mod tests {
             }
             assert!(hold.is_over());
             assert_eq!(hold.is_confirmed(), is_confirmed, "{moving:b}");
+            let next = hold.for_unmeasured();
+            assert_eq!(next.as_ref().map(|next| next.repeats), (!is_confirmed).then_some(MOST_REPEATS - 1));
+            let last = next.map(|next| ArmHold { repeats: 0, has_unmeasured: true, ..next });
+            assert!(
+                last.is_none_or(|last| last.for_unmeasured().is_none()),
+                "others have to have their turns"
+            );
         }
     }
 

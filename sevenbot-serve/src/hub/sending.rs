@@ -71,6 +71,7 @@ impl Hub {
         match hold.is_over() {
             false => self.hold = Some(hold),
             true if hold.is_wanted_again() => self.start_hold(),
+            true if let Some(next) = hold.for_unmeasured() => self.hold = Some(next),
             true if hold.is_confirmed() => {
                 self.line.send_read(now, Owner::MotorState, MOTOR_STATE.address, MOTOR_STATE.count);
             }

@@ -70,6 +70,11 @@ fn encode(request: &Request<'_>) -> Vec<u8> {
     frame.to_vec()
 }
 
+fn powered_up(now: Instant) -> SimulatedArm<Flash, Plant> {
+    let config = ArmConfig { chip_id: *b"SIM\0\0\x01", is_paced: true, torque_codes: TorqueCodes::default() };
+    SimulatedArm::new(now, config, Flash::in_memory(), Plant::new(now))
+}
+
 impl World {
     /// An arm that has started up, and programs that have sent nothing.
     pub fn new(programs: usize) -> Self {
@@ -81,10 +86,7 @@ impl World {
     }
 
     pub fn with_options(programs: usize, options: HubOptions) -> Self {
-        let config =
-            ArmConfig { chip_id: *b"SIM\0\0\x01", is_paced: true, torque_codes: TorqueCodes::default() };
-        let plant = Plant::new(Instant::ZERO);
-        let arm = SimulatedArm::new(Instant::ZERO, config, Flash::in_memory(), plant);
+        let arm = powered_up(Instant::ZERO);
         let hub = Hub::new(BAUD, options);
         let mut world = Self {
             now: Instant::ZERO,
@@ -143,6 +145,11 @@ impl World {
     pub fn plug(&mut self) {
         self.is_plugged = true;
         self.hub.open_arm(self.now);
+    }
+
+    /// The arm is switched off and on while it is plugged in.
+    pub fn power_cycle(&mut self) {
+        self.arm = powered_up(self.now);
     }
 
     pub fn unplug(&mut self) {
