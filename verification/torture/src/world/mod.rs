@@ -60,7 +60,7 @@ use disturbed_bus::DisturbedBus;
 use event_log::EventLog;
 use parameters::WorldParameters;
 use protection_model::PROTECTION;
-use request_generator::{RequestGenerator, UsedMaps};
+use request_generator::{HostHabits, RequestGenerator};
 pub use state::TortureWorld;
 use state::{PendingRequest, PowerState, PoweredArm};
 use status_checker::StatusChecker;
@@ -100,7 +100,7 @@ impl TortureWorld {
             bus: DisturbedBus::new(now, parameters.plant(), parameters.reply_time_bounds()),
             storage: parameters.storage(),
             parameters,
-            generator: RequestGenerator::new(now, scenario.settings_per_mille, UsedMaps::of(seed)),
+            generator: RequestGenerator::new(now, scenario.settings_per_mille, HostHabits::of(seed)),
             power: PowerState::Off { until: now, servos_too: false },
             is_servo: true,
             stalled_until: now,

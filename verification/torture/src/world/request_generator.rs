@@ -17,19 +17,25 @@ const MAX_PAUSE: Duration = Duration::from_millis(90);
 /// The first and last address of the extended block and the protection block.
 const EXTENDED: (usize, usize) = (128, 199);
 
-/// The parts of the register map that the host of a world writes.
+/// What the host of a world sends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct UsedMaps {
+pub(super) struct HostHabits {
     /// Half of the writes are in map 2.1. The other worlds have map 2.2 only.
     both_maps: bool,
     /// A quarter of the other writes are in the extended block.
     extended_block: bool,
+    /// Half of the time it only reads.
+    pauses: bool,
 }
 
-impl UsedMaps {
-    /// The parts in the world of a seed.
+impl HostHabits {
+    /// The habits in the world of a seed.
     pub(super) const fn of(seed: u64) -> Self {
-        Self { both_maps: seed / 8 % 2 == 1, extended_block: seed / 16 % 4 == 3 }
+        Self {
+            both_maps: seed / 8 % 2 == 1,
+            extended_block: seed / 16 % 4 == 3,
+            pauses: seed / 64 % 4 == 3,
+        }
     }
 }
 
@@ -58,23 +64,25 @@ pub(super) struct Transmission {
 pub(super) struct RequestGenerator {
     rate: RequestRate,
     rate_until: Instant,
+    only_reads: bool,
     pub(super) next_at: Instant,
     /// The number of corrupted transmissions in a million.
     pub(super) corrupted_per_million: u64,
     settings_per_mille: u64,
-    maps: UsedMaps,
+    habits: HostHabits,
     stream: SentStream,
 }
 
 impl RequestGenerator {
-    pub(super) fn new(now: Instant, settings_per_mille: u64, maps: UsedMaps) -> Self {
+    pub(super) fn new(now: Instant, settings_per_mille: u64, habits: HostHabits) -> Self {
         Self {
             rate: RequestRate::Steady,
             rate_until: now,
+            only_reads: false,
             next_at: now,
             corrupted_per_million: 0,
             settings_per_mille,
-            maps,
+            habits,
             stream: SentStream::default(),
         }
     }
@@ -92,6 +100,7 @@ impl RequestGenerator {
                 &[RequestRate::Idle, RequestRate::Steady, RequestRate::Steady, RequestRate::Bursts],
                 RequestRate::Idle,
             );
+            self.only_reads = self.habits.pauses && rng.one_in(2);
             self.rate_until = now + rng.any_scale(Duration::from_millis(500), Duration::from_millis(120_000));
         }
         let (count, pause) = match self.rate {
@@ -125,14 +134,14 @@ impl RequestGenerator {
 
     fn any_request(&self, rng: &mut SeededRng) -> HostRequest {
         match () {
-            () if rng.one_in(2) => self.read(rng),
-            () if self.maps.both_maps && rng.one_in(2) => self.write_map21(rng),
+            () if self.only_reads || rng.one_in(2) => self.read(rng),
+            () if self.habits.both_maps && rng.one_in(2) => self.write_map21(rng),
             () => {
-                let (address, mut values) = match self.maps.extended_block && rng.one_in(4) {
+                let (address, mut values) = match self.habits.extended_block && rng.one_in(4) {
                     true => extended_requests::write(rng),
                     false => self.write(rng),
                 };
-                if !self.maps.extended_block {
+                if !self.habits.extended_block {
                     leave_out(EXTENDED, address, &mut values);
                 }
                 HostRequest::Write { address, values }
