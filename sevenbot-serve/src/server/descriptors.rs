@@ -39,7 +39,11 @@ pub(super) fn connections() -> usize {
 
 /// As many of these places of a class as the descriptors are enough for, beside the programs at the Unix socket.
 pub(super) fn fitting(places: Places) -> Places {
-    let most = free().saturating_sub(connections()) / OF_CONNECTION;
+    fitting_in(places, free().saturating_sub(connections()))
+}
+
+fn fitting_in(places: Places, descriptors: usize) -> Places {
+    let most = descriptors / OF_CONNECTION;
     let clients = places.clients.min(most / 2).max(1);
     let unknown = places.unknown.min(most.saturating_sub(clients + places.reserved)).max(1);
     Places { clients, unknown, ..places }
@@ -62,4 +66,21 @@ fn free() -> usize {
 #[cfg(not(unix))]
 const fn free() -> usize {
     usize::MAX
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_class_has_as_many_places_as_there_are_descriptors() {
+        let places = Places { clients: 72, reserved: 8, unknown: 256 };
+        let fitting = |descriptors| {
+            let Places { clients, reserved, unknown } = fitting_in(places, descriptors);
+            [clients, reserved, unknown]
+        };
+        assert_eq!(fitting(2_000), [72, 8, 256]);
+        assert_eq!(fitting(183), [45, 8, 38], "the pupils, and not all connections of their browsers");
+        assert_eq!(fitting(0), [1, 8, 1]);
+    }
 }

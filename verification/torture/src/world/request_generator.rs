@@ -31,11 +31,7 @@ pub(super) struct HostHabits {
 impl HostHabits {
     /// The habits in the world of a seed.
     pub(super) const fn of(seed: u64) -> Self {
-        Self {
-            both_maps: seed / 8 % 2 == 1,
-            extended_block: seed / 16 % 4 == 3,
-            pauses: seed / 64 % 4 == 3,
-        }
+        Self { both_maps: seed / 8 % 2 == 1, extended_block: seed / 16 % 4 == 3, pauses: seed / 64 % 4 == 3 }
     }
 }
 
