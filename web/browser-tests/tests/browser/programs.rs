@@ -174,6 +174,8 @@ fn a_program_that_loops_without_end_leaves_the_page_alive_and_a_stop_ends_it_at_
     });
     page.key(" ");
     page.wait_for_text("#program-state", "The program was ended.");
+    // No program begins before the stop is confirmed.
+    page.wait_for_text("#state", "Stopped: the arm holds.");
 
     let number =
         |number: u32| format!(r#"{{"block": {{"type": "math_number", "fields": {{"NUM": {number}}}}}}}"#);
