@@ -26,6 +26,7 @@ sevenbot --port sim info
 sevenbot --port sim pose 120 90 65 90 90 90 80 --wait
 sevenbot --port sim record moments.txt --driven --yes --seconds 1
 test "$(wc -l < moments.txt)" -gt 10
+rm -f ready
 host-sim --quiet --eeprom none --control none --link /root/7bot > ready &
 for second in 1 2 3 4 5 6 7 8 9 10; do test -s ready || sleep 1; done
 sevenbot --port /root/7bot pose 90 90 65 90 90 90 60 --wait
