@@ -120,7 +120,7 @@ impl Wine {
         words.extend(["wine", &program, "--port", port, "monitor"]);
         let mut terminal = Terminal::run(Path::new("env"), &words);
         let drawn = wait_for("the joints on the screen", || {
-            let drawn = picture(&without_console(terminal.output()));
+            let drawn = picture(&without_console(&terminal.output()));
             let has_joints =
                 drawn.contains("joint  target  position") && drawn.matches('●').count() == JOINTS;
             Ok(has_joints.then_some(drawn))
@@ -141,15 +141,25 @@ impl Wine {
     }
 }
 
-/// The output of a program without what the console of Wine 8 adds. It takes escape sequences for text, so it begins a new line
-/// after each 80 characters, and sometimes puts its own cursor back.
-fn without_console(mut output: Vec<u8>) -> Vec<u8> {
-    for added in [b"\r\r\n".as_slice(), b"\x1b[K\x1b[?25h\x1b[?25l"] {
-        while let Some(at) = output.windows(added.len()).position(|bytes| bytes == added) {
-            output.drain(at..at + added.len());
+/// The output of a program without what the console of Wine 8 adds. It takes escape sequences for text: it begins a new row after each
+/// 80 characters, and sometimes draws the present row again.
+fn without_console(output: &[u8]) -> Vec<u8> {
+    const NEW_ROW: &[u8] = b"\r\r\n";
+    const ROW_AGAIN: &[u8] = b"\x1b[K\x1b[?25h\x1b[?25l\r";
+    let (mut written, mut row, mut rest) = (Vec::new(), Vec::new(), output);
+    while let Some((&byte, after)) = rest.split_first() {
+        if let Some(after) = rest.strip_prefix(NEW_ROW) {
+            written.append(&mut row);
+            rest = after;
+        } else if let Some(after) = rest.strip_prefix(ROW_AGAIN) {
+            rest = after.strip_prefix(row.as_slice()).unwrap_or(after);
+        } else {
+            row.push(byte);
+            rest = after;
         }
     }
-    output
+    written.append(&mut row);
+    written
 }
 
 /// The simulator of the release on this computer, and its port.
