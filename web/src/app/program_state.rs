@@ -9,8 +9,6 @@ pub(super) struct Programs {
     pub(super) is_open: bool,
     /// The program in the editor.
     pub(super) text: String,
-    /// What is shown beside it: the same program in Python, or what is missing.
-    pub(super) python: String,
     /// The program that is to be shown when the editor is there.
     pub(super) wanted: Option<String>,
     /// The block that is lit.

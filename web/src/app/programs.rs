@@ -118,19 +118,17 @@ impl App {
     fn program_changed(&mut self) {
         let Some(text) = Editor.text() else { return };
         storage::save(KEPT, &text);
+        if text != self.programs.text {
+            self.programs.ended = None;
+            self.dom.set_hidden("link-row", true);
+            Editor.warn(None, "");
+        }
         self.programs.text = text;
         let shown = match Program::parse(&self.programs.text) {
             Ok(program) => python(&program),
             Err(error) => format!("# {}\n", words::program_fault(self.language, &error.fault)),
         };
-        // The text changes also where a block only lies elsewhere.
-        if shown != self.programs.python {
-            self.programs.ended = None;
-            self.dom.set_hidden("link-row", true);
-            Editor.warn(None, "");
-            self.dom.set_text("python", &shown);
-            self.programs.python = shown;
-        }
+        self.dom.set_text("python", &shown);
     }
 
     /// The program as Python; says why there is none.
