@@ -17,12 +17,10 @@ use host_link::{Snapshot, Span};
 
 mod cause;
 mod server;
-mod server_reason;
 
-pub use cause::MismatchCause;
 pub(crate) use cause::cause_from_counters;
+pub use cause::{MismatchCause, ServerReason};
 use cause::{cause_from_access, cause_from_arm, cause_from_range};
-pub use server_reason::ServerReason;
 
 /// A register that does not hold what was written to it.
 ///

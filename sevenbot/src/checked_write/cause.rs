@@ -1,12 +1,12 @@
-//! Why a register does not hold what was written to it: from the table, the firmware and the status block.
+//! Why a register does not hold what was written to it: from the table, the firmware, the status block, and a server between.
 
 use std::fmt;
 
+use host_link::sharing::{DrivenBy, SharingState};
 use protocol_core::registers::map::{LIMITS, PRESENT_POSITION, refusal};
 use protocol_core::registers::map21::find_readable;
 use protocol_core::registers::{Access, Region, Register};
 
-use super::server_reason::ServerReason;
 use crate::map_view::MapView;
 use crate::names::name_of_register;
 use crate::register_text;
@@ -69,6 +69,29 @@ impl MismatchCause {
     #[must_use]
     pub const fn is_transient(self) -> bool {
         matches!(self, Self::Damaged | Self::Unknown)
+    }
+}
+
+/// Why a server does not pass on what a program writes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ServerReason {
+    /// It was started with `--read-only`.
+    ReadOnly,
+    /// A stop of another program ended what this one sends.
+    Stopped,
+    /// One program moves the arm at a time, and now another one does.
+    AnotherDrives,
+}
+
+impl ServerReason {
+    /// `None`: it passes writes on.
+    pub(super) fn of(state: &SharingState) -> Option<Self> {
+        match () {
+            () if state.is_read_only => Some(Self::ReadOnly),
+            () if state.is_stopped => Some(Self::Stopped),
+            () if state.has_one_driver && state.driven_by == DrivenBy::Another => Some(Self::AnotherDrives),
+            () => None,
+        }
     }
 }
 
@@ -150,6 +173,20 @@ impl fmt::Display for MismatchCause {
             Self::NotPassedOn(reason) => reason.fmt(out),
             Self::Unknown => out.write_str("the arm gives no reason; try again"),
         }
+    }
+}
+
+impl fmt::Display for ServerReason {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        out.write_str(match self {
+            Self::ReadOnly => {
+                "the server was started with --read-only, so nobody can change the arm through it"
+            }
+            Self::Stopped => "another program stopped the arm; pause for a second, then try again",
+            Self::AnotherDrives => {
+                "the server lets one program move the arm at a time, and another one does now"
+            }
+        })
     }
 }
 
