@@ -50,6 +50,11 @@ impl Platform {
         if self.debian.is_some() { &["host-sim", "sevenbot"] } else { &["sevenbot.exe"] }
     }
 
+    /// Makes zig the compiler and the linker of a build for Linux.
+    pub(super) fn use_zig(self, command: &mut Command) -> TaskResult {
+        tools::use_zig(command, self.triple, GLIBC)
+    }
+
     /// Builds the programs. Returns their folder.
     pub(super) fn build(self, release: &Release) -> TaskResult<PathBuf> {
         add_target(self.triple)?;
@@ -58,6 +63,7 @@ impl Platform {
                 let mut zigbuild = tools::cargo_with_zig("zigbuild")?;
                 zigbuild.args(["--package", "host-sim"]);
                 zigbuild.args(["--target", &format!("{}.{GLIBC}", self.triple)]);
+                self.use_zig(&mut zigbuild)?;
                 zigbuild
             }
             None => {
@@ -98,9 +104,6 @@ pub(super) fn reproducible(command: &mut Command, release: &Release, triple: &st
     let mut all = remapped_paths()?.join(" ");
     if triple == WINDOWS.triple {
         all.push_str(" -Clink-arg=-Wl,--no-insert-timestamp");
-    }
-    if PLATFORMS.iter().any(|platform| platform.triple == triple && platform.debian.is_some()) {
-        tools::use_zig(command, triple, GLIBC)?;
     }
     command
         .env(format!("CARGO_TARGET_{name}_RUSTFLAGS"), all)

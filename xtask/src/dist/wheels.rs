@@ -45,6 +45,7 @@ fn write_wheel(release: &Release, platform: Platform) -> TaskResult {
     maturin.args(["--quiet", "--locked", "--profile", PROFILE, "--target", platform.triple]);
     if platform.debian.is_some() {
         maturin.args(["--zig", "--compatibility", "manylinux2014"]);
+        platform.use_zig(&mut maturin)?;
     }
     run_command(&mut maturin)
 }
