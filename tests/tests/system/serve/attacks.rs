@@ -16,7 +16,9 @@ use system_tests::programs::tool;
 use system_tests::registers::{DEVICE_CODE, PRESENT_POSITION, SPEED, TARGET_POSITION};
 use system_tests::{ArmClient, read_request, write_request};
 
-use super::served::{LOCAL_PAGE, Served, WebClient, exchange, simulator, web_frame};
+use super::served::{
+    LOCAL_PAGE, Served, WebClient, exchange, read_until, simulator, web_frame, web_handshake,
+};
 
 /// The registers of the server.
 const DRIVEN_BY: u8 = 234;
@@ -310,19 +312,14 @@ fn a_command_that_waited_for_the_check_of_its_token_is_not_carried_out() {
     let mut arm = served.open("a");
     guess_tokens(&served);
     let mut stream = served.connect_web();
-    let request = b"GET /ws?token=correct-horse HTTP/1.1\r\nHost: localhost\r\nConnection: Upgrade\r\n\
-        Upgrade: websocket\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n";
     let command = |degrees| format!(r#"{{"cmd":"angle","id":0,"angle":{degrees}}}"#);
     let text = |text: &str| web_frame(0x81, text.as_bytes());
     let read = text(r#"{"cmd":"read","id":0,"num":1}"#);
-    stream.write_all(&[request.as_slice(), &text(&command(10)), &read].concat()).expect("bytes");
+    let handshake = web_handshake("correct-horse");
+    stream.write_all(&[handshake.as_bytes(), &text(&command(10)), &read].concat()).expect("bytes");
     stream.set_read_timeout(Some(Duration::from_secs(20))).expect("a timeout");
-    let mut answer = Vec::new();
-    while !answer.ends_with(b"}") {
-        let mut byte = [0];
-        stream.read_exact(&mut byte).expect("the answer to the read behind the command");
-        answer.push(byte[0]);
-    }
+    // The answer to the read behind the command.
+    read_until(&mut stream, b"}");
     assert_eq!(target(&mut arm), 90);
     system_tests::wait::wait_until("a new command is carried out", || {
         stream.write_all(&text(&command(100))).expect("bytes");

@@ -168,6 +168,26 @@ pub(crate) fn exchange(stream: &mut TcpStream, request: &[u8], expected: &[u8]) 
     assert_eq!(received, expected);
 }
 
+/// Reads up to and with these bytes.
+#[track_caller]
+pub(crate) fn read_until(stream: &mut TcpStream, end: &[u8]) -> Vec<u8> {
+    let mut received = Vec::new();
+    while !received.ends_with(end) {
+        let mut byte = [0];
+        stream.read_exact(&mut byte).expect("an answer");
+        received.push(byte[0]);
+    }
+    received
+}
+
+/// What a program sends to open the maker's WebSocket.
+pub(crate) fn web_handshake(token: &str) -> String {
+    format!(
+        "GET /ws?token={token} HTTP/1.1\r\nHost: localhost\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n\
+         Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
+    )
+}
+
 /// A frame of a WebSocket client: `start` holds the bit for the last fragment and the kind.
 pub(crate) fn web_frame(start: u8, payload: &[u8]) -> Vec<u8> {
     let length = u16::try_from(payload.len()).expect("a short frame");

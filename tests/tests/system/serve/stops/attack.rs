@@ -9,7 +9,7 @@ use system_tests::{read_request, write_request};
 
 use super::gate::Gate;
 use super::program::{Program, TOKEN, log_in};
-use crate::serve::served::{Served, web_frame};
+use crate::serve::served::{Served, read_until, web_frame, web_handshake};
 
 /// The watchdog of a program, in hundredths of a second.
 const HOST_WATCHDOG: u8 = 186;
@@ -142,17 +142,8 @@ fn silent(served: &Served, gate: &Gate) {
 /// A connection to the WebSocket, after the handshake.
 fn upgraded(served: &Served) -> TcpStream {
     let mut stream = served.connect_web();
-    let head = format!(
-        "GET /ws?token={TOKEN} HTTP/1.1\r\nHost: localhost\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n\
-         Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
-    );
-    stream.write_all(head.as_bytes()).expect("taken");
-    let mut answer = Vec::new();
-    while !answer.ends_with(b"\r\n\r\n") {
-        let mut byte = [0];
-        stream.read_exact(&mut byte).expect("an answer");
-        answer.push(byte[0]);
-    }
+    stream.write_all(web_handshake(TOKEN).as_bytes()).expect("taken");
+    let answer = read_until(&mut stream, b"\r\n\r\n");
     assert!(answer.starts_with(b"HTTP/1.1 101"), "{}", String::from_utf8_lossy(&answer));
     stream.set_write_timeout(Some(Duration::from_millis(20))).expect("a timeout");
     stream
