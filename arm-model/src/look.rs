@@ -4,8 +4,8 @@
 //! the model look like an arm for a desk.
 
 use kinematics::geometry::{
-    BASE_HEIGHT, BASE_RADIUS, DISC_RADIUS, ELBOW_OFFSET, FOREARM, LEVER, REAR_ARM, SHOULDER_FORWARD,
-    SHOULDER_HEIGHT, TOOL,
+    BASE_HEIGHT, BASE_RADIUS, DISC_RADIUS, ELBOW_OFFSET, FINGER_AXIS, FINGER_BEND, FINGER_END, FOREARM, LEVER,
+    REAR_ARM, SHOULDER_FORWARD, SHOULDER_HEIGHT, TOOL,
 };
 
 use crate::chain::Axes;
@@ -94,9 +94,6 @@ impl Body {
         mesh
     }
 }
-
-/// From the tip to the axes of the fingers, and from the tool's axis to each of them.
-pub(crate) const FINGER_AXIS: [f64; 2] = [14.0, 11.0];
 
 const ORIGIN: Axes = [0.0; 3];
 const ELBOW: Axes = [0.0, 0.0, REAR_ARM];
@@ -220,8 +217,8 @@ fn finger(mesh: &mut Mesh, side: f64) {
         [([x0, side * y0, 0.0], r0), ([x1, side * y1, 0.0], r1)]
     };
     mesh.cylinder(Accent, MeshAxis::Z, ORIGIN, 5.5, [-9.0, 9.0]);
-    mesh.plate(Accent, MeshAxis::Z, &bone([[0.0, 0.0], [22.0, 6.0]], [4.5, 4.0]), [-8.0, 8.0]);
-    mesh.plate(Shell, MeshAxis::Z, &bone([[22.0, 6.0], [52.0, -7.0]], [4.0, 2.5]), [-8.0, 8.0]);
+    mesh.plate(Accent, MeshAxis::Z, &bone([[0.0, 0.0], FINGER_BEND], [4.5, 4.0]), [-8.0, 8.0]);
+    mesh.plate(Shell, MeshAxis::Z, &bone([FINGER_BEND, FINGER_END], [4.0, 2.5]), [-8.0, 8.0]);
 }
 
 /// The meshes of the links of the models, in mm. Those have neither rod nor claw.

@@ -1,9 +1,9 @@
 //! Where the bodies of the arm are, from the angles of its joints.
 
-use kinematics::geometry::{LEVER, REAR_ARM};
+use kinematics::geometry::{FINGER_AXIS, LEVER, REAR_ARM};
 use kinematics::{Frames, Vector, forward};
 
-use crate::look::{Body, FINGER_AXIS};
+use crate::look::Body;
 
 /// The axes of a body and its origin in mm, in the frame of the arm: x to the right, y forward, z up.
 #[derive(Clone, Copy, Debug, PartialEq)]

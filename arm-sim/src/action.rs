@@ -8,10 +8,11 @@ use protocol_core::registers::Joint;
 use protocol_core::time::Duration;
 
 use crate::faults::{ArmFault, FaultLocation};
+use crate::scene::Scene;
 use crate::servo::Trip;
 
 /// Something that is done to an arm. Times are in microseconds in its words, and positions in counts.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Action {
     /// `disconnect`: the last client closes the port.
     Disconnect,
@@ -39,6 +40,8 @@ pub enum Action {
     Drop,
     /// `trip 2` latches an overload of a joint's servo; `trip 2 heat` makes it too hot.
     Trip(Joint, Trip),
+    /// `scene cube red 30 40 0 220; table -60`: what stands on the table ([`Scene`]). `scene off`: nothing, and no table.
+    Scene(Option<Scene>),
     /// `seed 7`: what the faults of the host line are drawn from.
     Seed(u64),
 }
@@ -47,7 +50,7 @@ pub enum Action {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "use disconnect, power-off, power-cycle, restart, halt, fault, clear, hand, hold, let-go, weight, \
-     drop, trip or seed, with their values"
+     drop, trip, scene or seed, with their values"
 )]
 pub struct UnknownAction;
 
@@ -59,6 +62,10 @@ impl FromStr for Action {
             word.parse().map_err(|_| UnknownAction)
         }
         let joint = |word: &str| value(word).and_then(|number| Joint::new(number).ok_or(UnknownAction));
+        if let Some(scene) = text.strip_prefix("scene ") {
+            let scene = if scene == "off" { None } else { Some(value(scene)?) };
+            return Ok(Self::Scene(scene));
+        }
         let words: Vec<&str> = text.split(' ').collect();
         Ok(match *words.as_slice() {
             ["disconnect"] => Self::Disconnect,
@@ -104,6 +111,8 @@ impl Display for Action {
             Self::Drop => out.write_str("drop"),
             Self::Trip(joint, Trip::Overload) => write!(out, "trip {}", joint.number()),
             Self::Trip(joint, Trip::Heat) => write!(out, "trip {} heat", joint.number()),
+            Self::Scene(None) => out.write_str("scene off"),
+            Self::Scene(Some(scene)) => write!(out, "scene {scene}"),
             Self::Seed(seed) => write!(out, "seed {seed}"),
         }
     }
@@ -137,6 +146,8 @@ mod tests {
             "trip 2",
             "trip 2 heat",
             "fault 2=wall=60.5/500 2000000",
+            "scene off",
+            "scene table -60; cube red 30 40 0 220 0",
             "seed 18446744073709551615",
         ] {
             assert_eq!(text.parse::<Action>().map(|action| action.to_string()), Ok(text.into()));
@@ -153,6 +164,8 @@ mod tests {
             "fault 3",
             "clear x",
             "weight -1",
+            "scene",
+            "scene cube",
             "seed",
             "on",
         ] {

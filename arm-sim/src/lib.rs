@@ -43,6 +43,7 @@ pub mod pace;
 pub mod parameters;
 pub mod plant;
 pub mod replay;
+pub mod scene;
 pub mod servo;
 pub mod servo_bus;
 pub mod session;
@@ -52,6 +53,7 @@ pub mod simulation;
 pub mod stock_controller;
 pub mod tap;
 pub mod usb_adapter;
+pub mod world;
 
 pub use action::Action;
 pub use protocol_core::registers::Joint;

@@ -15,11 +15,13 @@ mod inertia;
 mod obstacles;
 mod outside;
 mod pose;
+mod room;
 mod sine;
 mod supply;
 mod weight;
 mod wire;
 
+use alloc::boxed::Box;
 use alloc::vec::Vec;
 
 use motion_core::calibration::{MicroDegrees, counts_from_angle};
@@ -32,6 +34,7 @@ use protocol_core::time::{Duration, Instant};
 use crate::fault_count::FaultCount;
 use crate::servo::units::STEP;
 use crate::servo::{Servo, ServoConfig, ServoFault};
+use crate::world::World;
 pub use obstacles::{HIGHEST_STIFFNESS, STRONGEST_PUSH, Thing, Wall};
 pub use outside::OutsideState;
 use pose::{AngleScale, JointSines};
@@ -57,8 +60,14 @@ pub struct Plant {
     supply: Supply,
     /// The weight in the gripper, in grams.
     load_g: u16,
-    /// The claws have touched what is between them.
+    /// What is between the claws.
+    thing: Option<Thing>,
+    /// The claws have touched it.
     is_thing_gripped: bool,
+    /// What stands on the table.
+    world: Option<Box<World>>,
+    /// The pump sucks.
+    is_sucking: bool,
     has_echo: bool,
     /// Of the echo, in bytes.
     echo_count: FaultCount,
@@ -92,7 +101,10 @@ impl Plant {
             wire: Wire::at_baud(DELIVERED_BAUD),
             supply: Supply::default(),
             load_g: 0,
+            thing: None,
             is_thing_gripped: false,
+            world: None,
+            is_sucking: false,
             has_echo: false,
             echo_count: FaultCount::default(),
             has_exact_times: true,
@@ -206,6 +218,7 @@ impl Plant {
             let ends = self.servos.iter().map(|servo| servo.rest_until(self.now, supply));
             self.rest_until = ends.min().unwrap_or(self.now).min(self.supply.steady_until(self.now));
         }
+        self.follow_in_room();
     }
 
     /// The arm after a step in which these joints turned.

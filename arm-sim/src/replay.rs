@@ -85,7 +85,7 @@ impl<C: ArmController> ReplayedArm for SimulatedArm<Flash, Plant, C> {
                 self.host_send(entry.now, bytes);
             }
             SessionEvent::Acted(action) => {
-                self.act(entry.now, *action);
+                self.act(entry.now, action.clone());
             }
             SessionEvent::Taken(recorded) => {
                 let mut replayed = Vec::new();

@@ -37,7 +37,7 @@ pub trait SessionRecorder: Debug + Send {
 }
 
 /// What happened.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum SessionEvent {
     /// The host started to send these bytes.
     Sent(Vec<u8>),
@@ -50,7 +50,7 @@ pub enum SessionEvent {
 }
 
 /// Something that happened to an arm: a line of a session.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Entry {
     /// When it happened.
     pub now: Instant,

@@ -292,7 +292,10 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
                     self.to_host.push(self.now, bytes);
                 }
                 Output::ToServos(bytes) => self.bus.bytes(self.now, bytes),
-                Output::Vacuum(vacuum) => log_vacuum(vacuum),
+                Output::Vacuum(vacuum) => {
+                    log_vacuum(vacuum);
+                    self.suck(vacuum.pump);
+                }
                 Output::Save(image) => {
                     self.settings.save(&image);
                     self.controller.set_storage(self.storage());
@@ -304,6 +307,11 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
                 }
             }
         }
+    }
+
+    /// Lets the simulated pump suck, or not.
+    fn suck(&mut self, is_sucking: bool) {
+        self.bus.plant_mut().into_iter().for_each(|plant| plant.set_sucking(is_sucking));
     }
 }
 

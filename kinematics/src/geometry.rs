@@ -39,6 +39,14 @@ pub const BASE_HEIGHT: f64 = 60.0;
 /// Radius of the foot, the widest part of the base; an estimate.
 pub const BASE_RADIUS: f64 = 78.0;
 
+/// The axes of the claw's fingers: their distance from the disc along the tool, and from the tool's axis to either side. This and
+/// the next two are estimates.
+pub const FINGER_AXIS: [f64; 2] = [14.0, 11.0];
+/// The bend of a finger: along the tool and outward from its axis, with the claw closed.
+pub const FINGER_BEND: [f64; 2] = [22.0, 6.0];
+/// The end of a finger, in the same way.
+pub const FINGER_END: [f64; 2] = [52.0, -7.0];
+
 /// From the elbow axis to the wrist: the hypotenuse of [`FOREARM`] and [`ELBOW_OFFSET`].
 pub(crate) const ELBOW_TO_WRIST: f64 = 200.068_113_401_411_37;
 /// The angle between that line and the axis of the forearm.

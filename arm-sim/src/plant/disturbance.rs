@@ -113,6 +113,7 @@ impl Plant {
     pub fn power_cycle(&mut self, now: Instant) {
         self.advance(now);
         self.supply.switch(true);
+        self.is_sucking = false;
         let ready_at = now + self.config.boot_time;
         for servo in self.servos_mut() {
             servo.power_cycle(ready_at);
@@ -126,6 +127,7 @@ impl Plant {
     pub fn power_off(&mut self, now: Instant) {
         self.advance(now);
         self.supply.switch(false);
+        self.is_sucking = false;
         for servo in self.servos_mut() {
             servo.power_cycle(Instant::FAR_FUTURE);
             servo.hold_by_hand(false);

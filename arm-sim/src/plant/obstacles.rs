@@ -53,6 +53,7 @@ impl Plant {
     /// Puts a thing between the claws, or takes it away. Joint 7 cannot close any further than its angle. The weight of
     /// the thing is that of [`Plant::set_load`].
     pub fn set_thing(&mut self, thing: Option<Thing>) {
+        self.thing = thing;
         self.is_thing_gripped = false;
         let obstacle = thing.map(|Thing { millidegrees, stiffness }| {
             let position = AngleScale::of(CLAW).position(millidegrees.into());
@@ -112,8 +113,8 @@ impl Plant {
 
     /// Is a thing between the claws?
     #[must_use]
-    pub fn has_thing(&self) -> bool {
-        self.servo(CLAW).is_some_and(|servo| servo.thing().is_some())
+    pub const fn has_thing(&self) -> bool {
+        self.thing.is_some()
     }
 
     /// Grips the thing when the claws touch it, and drops it when they open beyond it.

@@ -23,6 +23,16 @@ impl Servo {
         self.motor.surroundings.inertia = inertia;
     }
 
+    /// Sets the torque of what the arm touches in its room, in micronewton metres, towards more counts.
+    pub(crate) const fn set_contact(&mut self, torque: i64) {
+        self.motor.surroundings.contact = torque;
+    }
+
+    /// That torque.
+    pub(crate) const fn contact(&self) -> i64 {
+        self.motor.surroundings.contact
+    }
+
     /// Sets or takes away the wall. A wall counts the milliseconds in which the joint touches it.
     pub(crate) fn set_wall(&mut self, wall: Option<Surface>) {
         self.motor.surroundings.wall = wall;

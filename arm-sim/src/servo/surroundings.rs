@@ -67,6 +67,8 @@ pub(crate) struct Surroundings {
     pub(crate) inertia: i64,
     /// The torque of a hand.
     pub(crate) push: i64,
+    /// The torque of what the arm touches in its room.
+    pub(crate) contact: i64,
     pub(crate) wall: Option<Surface>,
     /// What is between the claws. Only joint 7 has it.
     pub(crate) thing: Option<Surface>,
@@ -85,7 +87,7 @@ impl Surroundings {
     /// The torque on a joint at this position. Stiff obstacles are in [`Surroundings::range`] instead.
     pub(crate) fn torque(&self, position: i64) -> i64 {
         let obstacles: i64 = self.obstacles().map(|obstacle| obstacle.torque(position)).sum();
-        self.weight + self.push + obstacles
+        self.weight + self.push + self.contact + obstacles
     }
 
     /// The range of positions that a joint can reach from here, of this range.
@@ -100,9 +102,9 @@ mod tests {
 
     const ALL: (i64, i64) = (0, 1_000);
 
-    const fn wall(side: Side, stiffness: Option<i64>) -> Surroundings {
+    fn wall(side: Side, stiffness: Option<i64>) -> Surroundings {
         let wall = Some(Surface { side, position: 500, stiffness });
-        Surroundings { weight: 0, inertia: 0, push: 0, wall, thing: None }
+        Surroundings { wall, ..Surroundings::default() }
     }
 
     #[test]

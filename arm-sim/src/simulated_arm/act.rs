@@ -31,19 +31,31 @@ impl<F: NorFlash, C: ArmController> SimulatedArm<F, Plant, C> {
                 self.simulate(now, false);
                 self.set_seed(seed);
             }
-            Action::Hand(joint, counts) => self.plant_for(now, action).move_by_hand(joint, counts),
-            Action::Hold(joint) => self.plant_for(now, action).hold(joint),
-            Action::LetGo(joint) => self.plant_for(now, action).let_go(joint),
             Action::Drop => return self.drop_thing(now),
-            Action::Trip(joint, trip) => self.plant_for(now, action).trip(joint, trip),
-            Action::Weight(grams) => self.plant_for(now, action).set_load(grams),
+            Action::Hand(..)
+            | Action::Hold(_)
+            | Action::LetGo(_)
+            | Action::Trip(..)
+            | Action::Weight(_)
+            | Action::Scene(_) => {
+                self.record_action(now, action.clone());
+                self.simulate(now, false);
+                act_on_plant(self.plant_mut(), action);
+            }
         }
         Vec::new()
     }
+}
 
-    fn plant_for(&mut self, now: Instant, action: Action) -> &mut Plant {
-        self.record_action(now, action);
-        self.simulate(now, false);
-        self.plant_mut()
+/// Carries out an action on the simulated servos and what is round them. The others are for the controller or the lines.
+fn act_on_plant(plant: &mut Plant, action: Action) {
+    match action {
+        Action::Hand(joint, counts) => plant.move_by_hand(joint, counts),
+        Action::Hold(joint) => plant.hold(joint),
+        Action::LetGo(joint) => plant.let_go(joint),
+        Action::Trip(joint, trip) => plant.trip(joint, trip),
+        Action::Weight(grams) => plant.set_load(grams),
+        Action::Scene(scene) => plant.set_scene(scene),
+        _ => {}
     }
 }

@@ -68,6 +68,7 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
         self.settings.reopen();
         self.controller = start(now, self.config, &self.settings, faults, &self.bus);
         self.controller_due = now;
+        self.suck(false);
         self.controller.set_storage(self.storage());
         self.is_halted = false;
         self.is_off = false;

@@ -5,6 +5,7 @@
 mod disturbances;
 mod gravity;
 mod obstacles;
+mod room;
 mod rig;
 mod servo_faults;
 mod simulated_arm;

@@ -1,0 +1,417 @@
+//! The room of the arm: a table, walls, and objects that can be gripped, sucked, pushed, stacked and dropped.
+//!
+//! ```text
+//!   angles, claws, pump ──▶ Hand ──▶ balls ──▶ touch table, walls and objects ──▶ torques on joints 1 to 6
+//!                             │                          └──▶ objects that stand free are pushed
+//!                             └──▶ an object between the claws or at the cup is carried, and dropped
+//! ```
+//!
+//! It is no simulation of rigid bodies, but what is needed for an arm that sorts and stacks, in steps of a millisecond:
+//! - A part of the arm, or what it carries, that touches something is pushed back by 8 N for each mm, at right angles to
+//!   the surface. So the table is an obstacle like any other. There is no friction and no bounce.
+//! - An object that is pushed from the side moves out of the way, with what stands on it, unless a wall stops it. It never
+//!   tips over, and does not turn.
+//! - An object falls until its middle is above something, and stands there upright. What is let go rights itself.
+//! - The claws carry an object once they touch it on both sides, however hard they press, until they open. The cup carries
+//!   an object that it touches with the pump on.
+//!
+//! All numbers are `f64`, and only exactly rounded operations are used: all machines get the same bits.
+
+mod frame;
+mod hand;
+mod solid;
+
+use alloc::string::String;
+use alloc::vec::Vec;
+
+use kinematics::Vector;
+use protocol_core::registers::JOINTS;
+
+use crate::scene::{Block, Form, Item, Scene, Tool};
+pub use frame::Frame;
+use frame::{Point, UP};
+use hand::{Ball, Grip, Hand, angle_for};
+use solid::Solid;
+
+/// The force that pushes back, in N for each mm: such that it is stable with the lightest part of the arm.
+const STIFFNESS: f64 = 8.0;
+/// A step in seconds.
+const STEP_S: f64 = 0.001;
+/// In mm per second squared.
+const GRAVITY: f64 = 9_807.0;
+/// Two surfaces this near to each other touch, in mm.
+const NEAR: f64 = 0.5;
+/// Claws that are narrower than an object by more than this do not hold it, in mm.
+const PLAY: f64 = 4.0;
+/// The cup carries an object from this distance on, in mm.
+const SUCTION: f64 = 3.0;
+/// Objects that push each other: no longer row moves.
+const LONGEST_ROW: u32 = 4;
+/// Nothing falls below this, in mm below the table.
+const FLOOR: f64 = 700.0;
+
+/// An object in the room.
+#[derive(Clone, Debug)]
+pub struct Object {
+    /// Its name, form and weight, and where it was at first.
+    pub item: Item,
+    /// Where it is: the middle of it, and its axes.
+    pub frame: Frame,
+    /// Does the arm carry it?
+    pub is_carried: bool,
+    solid: Solid,
+    /// Downward, in mm per second.
+    speed: f64,
+}
+
+impl Object {
+    fn bottom(&self) -> f64 {
+        self.frame.origin.z - self.solid.half_height()
+    }
+
+    fn top(&self) -> f64 {
+        self.frame.origin.z + self.solid.half_height()
+    }
+
+    /// Is this point above or below it?
+    fn covers(&self, point: Point) -> bool {
+        let at = Vector::new(point.x, point.y, self.frame.origin.z);
+        self.solid.touch(&self.frame, at, 0.0).is_some()
+    }
+}
+
+/// What the arm does at one time.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ArmInWorld {
+    /// The true angles of joints 1 to 7, in degrees.
+    pub(crate) angles: [f64; JOINTS],
+    /// The claws have touched what is between them, and have not opened since.
+    pub(crate) is_gripping: bool,
+    /// The pump sucks.
+    pub(crate) is_sucking: bool,
+}
+
+/// What the room does to the arm.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Effect {
+    /// The torques on joints 1 to 6 in mN m, towards greater angles.
+    pub(crate) torques: [f64; 6],
+    /// The angle of joint 7 in degrees at which the claws touch what is between them.
+    pub(crate) claw_stop: Option<f64>,
+    /// What the arm carries, in grams.
+    pub(crate) load_g: u16,
+}
+
+/// The table, with everything on it.
+#[derive(Clone, Debug)]
+pub struct World {
+    scene: Scene,
+    walls: Vec<(Frame, Solid)>,
+    objects: Vec<Object>,
+    /// The object between the claws, carried or not.
+    between: Option<usize>,
+    /// The carried object, and where it is seen from the tip.
+    carried: Option<(usize, Frame)>,
+    is_moving: bool,
+}
+
+impl World {
+    /// The room at first.
+    #[must_use]
+    pub fn new(scene: Scene) -> Self {
+        let table = scene.table;
+        let wall = |Block { at: [x, y], size, .. }: &Block| {
+            let [_, _, height] = *size;
+            let frame = Frame::upright(Vector::new(*x, *y, table + height / 2.0), 0.0);
+            (frame, Solid::Box(size.map(|edge| edge / 2.0)))
+        };
+        let walls = scene.walls.iter().map(wall).collect();
+        let items = scene.items.clone();
+        let mut world =
+            Self { scene, walls, objects: Vec::new(), between: None, carried: None, is_moving: true };
+        items.into_iter().for_each(|item| world.place(item));
+        world
+    }
+
+    /// Puts an object on what is below it.
+    fn place(&mut self, item: Item) {
+        let solid = Solid::from(item.form);
+        let [x, y] = item.at;
+        let top = self.support(None, Vector::new(x, y, f64::MAX), f64::MAX);
+        let frame = Frame::upright(Vector::new(x, y, top + solid.half_height()), item.turn);
+        self.objects.push(Object { item, frame, is_carried: false, solid, speed: 0.0 });
+    }
+
+    /// The scene that it began with.
+    #[must_use]
+    pub const fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// The objects, in the order of the scene.
+    #[must_use]
+    pub fn objects(&self) -> &[Object] {
+        &self.objects
+    }
+
+    /// Does something fall, or was it moved in the last step?
+    pub(crate) const fn is_moving(&self) -> bool {
+        self.is_moving
+    }
+
+    /// A step of a millisecond, after which the arm is in this pose.
+    pub(crate) fn step(&mut self, arm: ArmInWorld) -> Effect {
+        self.is_moving = false;
+        let hand = Hand::new(arm.angles);
+        self.carry(&hand, arm);
+        self.fall();
+        let balls = self.balls(&hand);
+        balls.iter().for_each(|ball| self.push_objects(ball));
+        let claw_stop = self.claw_stop(&hand);
+        let carried = self.carried.and_then(|(index, _)| self.objects.get(index));
+        Effect {
+            torques: self.torques(&hand, &balls),
+            claw_stop,
+            load_g: carried.map_or(0, |object| object.item.grams),
+        }
+    }
+
+    /// Takes, moves and drops what the arm carries.
+    fn carry(&mut self, hand: &Hand, arm: ArmInWorld) {
+        let tip = hand.tip();
+        let is_holding = match self.scene.tool {
+            Tool::Claws => arm.is_gripping,
+            Tool::Cup => arm.is_sucking,
+        };
+        if !is_holding {
+            self.drop_carried();
+            return;
+        }
+        if self.carried.is_none() {
+            let found = match self.scene.tool {
+                Tool::Claws => self.between,
+                Tool::Cup => self.at_cup(&tip),
+            };
+            let found = found.and_then(|index| Some((index, self.objects.get(index)?.frame.seen_from(&tip))));
+            self.carried = found;
+        }
+        let Some((index, frame)) = self.carried else { return };
+        if let Some(object) = self.objects.get_mut(index) {
+            (object.is_carried, object.speed) = (true, 0.0);
+            object.frame = frame.carried_by(&tip);
+        }
+    }
+
+    fn drop_carried(&mut self) {
+        let Some((index, _)) = self.carried.take() else { return };
+        self.between = None;
+        if let Some(object) = self.objects.get_mut(index) {
+            object.is_carried = false;
+            object.frame = Frame::upright(object.frame.origin, object.frame.turn());
+            self.is_moving = true;
+        }
+    }
+
+    /// The object at the end of the cup.
+    fn at_cup(&self, tip: &Frame) -> Option<usize> {
+        let end = tip.point(Vector::new(hand::CUP, 0.0, 0.0));
+        self.objects.iter().position(|object| {
+            let touch = object.solid.touch(&object.frame, end, SUCTION);
+            // The cup closes on a face that it meets straight on.
+            touch.is_some_and(|touch| touch.normal.dot(tip.x) < -0.9)
+        })
+    }
+
+    /// Finds what is between the claws, and moves it to their middle as they close. Returns where they touch it.
+    fn claw_stop(&mut self, hand: &Hand) -> Option<f64> {
+        let grip = hand.grip();
+        self.between = match self.carried {
+            Some((index, _)) => Some(index),
+            None => self.find_between(&grip),
+        };
+        let index = self.between?;
+        let object = self.objects.get(index)?;
+        let reach = object.solid.reach(&object.frame, grip.frame.y);
+        let aside = grip.frame.local(object.frame.origin).y;
+        let excess = aside.abs() + reach - grip.gap / 2.0;
+        if self.carried.is_none() && excess > 0.0 && aside != 0.0 {
+            self.shove(index, grip.frame.y * (excess.min(aside.abs()) * -aside.signum()), 0);
+        }
+        angle_for(2.0 * reach)
+    }
+
+    fn find_between(&self, grip: &Grip) -> Option<usize> {
+        if self.scene.tool == Tool::Cup {
+            return None;
+        }
+        self.objects.iter().position(|object| {
+            let Vector { x, y, z } = grip.frame.local(object.frame.origin);
+            let reach = |axis| object.solid.reach(&object.frame, axis);
+            let [ahead, aside, above] = [grip.frame.x, grip.frame.y, grip.frame.z].map(reach);
+            // Both pads have to meet it, which each does with its middle.
+            let is_at_pads = x.abs() < ahead && z.abs() < above;
+            is_at_pads && y.abs() < grip.gap / 2.0 && 2.0 * aside < grip.gap + PLAY
+        })
+    }
+
+    /// The balls of the arm, and the corners of what it carries.
+    fn balls(&self, hand: &Hand) -> Vec<Ball> {
+        let carried = self.carried.and_then(|(index, _)| self.objects.get(index));
+        let corners = carried.into_iter().flat_map(|object| {
+            object.solid.corners(&object.frame).map(|point| Ball::new(point, 0.0, 6))
+        });
+        hand.balls(self.scene.tool).chain(corners).collect()
+    }
+
+    /// Lets objects fall.
+    fn fall(&mut self) {
+        for index in 0..self.objects.len() {
+            let Some(object) = self.objects.get(index).filter(|object| !object.is_carried) else { continue };
+            let bottom = object.bottom();
+            let support = self.support(Some(index), object.frame.origin, bottom);
+            let Some(object) = self.objects.get_mut(index) else { continue };
+            if bottom <= support {
+                object.speed = 0.0;
+                continue;
+            }
+            object.speed += GRAVITY * STEP_S;
+            let next = (bottom - object.speed * STEP_S).max(support);
+            object.frame.origin.z = next + object.solid.half_height();
+            self.is_moving = true;
+        }
+    }
+
+    /// The top of what is below a point, for the object with this index whose bottom is at this height.
+    fn support(&self, index: Option<usize>, point: Point, bottom: f64) -> f64 {
+        let is_below = |top: f64| top <= bottom + NEAR;
+        let walls = self.walls.iter().filter_map(|(frame, solid)| {
+            let at = Vector::new(point.x, point.y, frame.origin.z);
+            solid.touch(frame, at, 0.0).map(|_| frame.origin.z + solid.half_height())
+        });
+        let others =
+            self.objects.iter().enumerate().filter(|(other, object)| {
+                Some(*other) != index && !object.is_carried && object.covers(point)
+            });
+        let tops = walls.chain(others.map(|(_, object)| object.top()));
+        let table = if is_below(self.scene.table) { self.scene.table } else { self.scene.table - FLOOR };
+        tops.filter(|top| is_below(*top)).fold(table, f64::max)
+    }
+
+    /// Objects move out of the way of a ball that touches their side.
+    fn push_objects(&mut self, ball: &Ball) {
+        for index in 0..self.objects.len() {
+            let Some(object) = self.objects.get(index) else { continue };
+            if object.is_carried || self.is_left_to_pads(index, ball) {
+                continue;
+            }
+            let Some(touch) = object.solid.touch(&object.frame, ball.point, ball.radius) else { continue };
+            if touch.normal.z.abs() < 0.5 {
+                self.shove(index, touch.normal * -touch.depth, 0);
+            }
+        }
+    }
+
+    /// Does the pad of a finger touch this object, instead of its end?
+    fn is_left_to_pads(&self, index: usize, ball: &Ball) -> bool {
+        ball.is_finger_end && self.between == Some(index)
+    }
+
+    /// Moves an object along the table, and those in its way. Returns whether nothing stops it.
+    fn shove(&mut self, index: usize, by: Point, row: u32) -> bool {
+        let Some(object) = self.objects.get(index) else { return false };
+        let (radius, bottom, top) = (object.solid.inner_radius(), object.bottom(), object.top());
+        let from = object.frame.origin;
+        let to = from + by;
+        let is_stopped = self.walls.iter().any(|(frame, solid)| {
+            let wall = frame.origin.z + solid.half_height();
+            let at = |point: Point| Vector::new(point.x, point.y, frame.origin.z);
+            let depth = |point| solid.touch(frame, at(point), radius).map_or(0.0, |touch| touch.depth);
+            bottom < wall - NEAR && depth(to) > depth(from)
+        });
+        if is_stopped || row > LONGEST_ROW {
+            return false;
+        }
+        for other in 0..self.objects.len() {
+            let Some(next) = self.objects.get(other).filter(|next| other != index && !next.is_carried) else {
+                continue;
+            };
+            let apart = Vector::new(next.frame.origin.x - to.x, next.frame.origin.y - to.y, 0.0);
+            let overlap = radius + next.solid.inner_radius() - apart.length();
+            let is_beside = bottom < next.top() - NEAR && next.bottom() < top - NEAR;
+            if is_beside && overlap > 0.0 && apart.dot(by) > 0.0 {
+                let Some(direction) = apart.unit() else { return false };
+                if !self.shove(other, direction * overlap, row + 1) {
+                    return false;
+                }
+            }
+        }
+        self.slide(index, by);
+        true
+    }
+
+    /// Moves an object, and what stands on it.
+    fn slide(&mut self, index: usize, by: Point) {
+        for rider in self.riders(index) {
+            self.slide(rider, by);
+        }
+        if let Some(object) = self.objects.get_mut(index) {
+            object.frame.origin = object.frame.origin + Vector::new(by.x, by.y, 0.0);
+            self.is_moving = true;
+        }
+    }
+
+    /// What stands on an object.
+    fn riders(&self, index: usize) -> Vec<usize> {
+        let Some(below) = self.objects.get(index) else { return Vec::new() };
+        let stands_on_it = |rider: &Object| {
+            let is_at_top = (rider.bottom() - below.top()).abs() < NEAR;
+            is_at_top && !rider.is_carried && below.covers(rider.frame.origin)
+        };
+        let all = self.objects.iter().enumerate();
+        all.filter(|(_, rider)| stands_on_it(rider)).map(|(rider, _)| rider).collect()
+    }
+
+    /// What pushes the arm back.
+    fn torques(&self, hand: &Hand, balls: &[Ball]) -> [f64; 6] {
+        let mut sum = [0.0; 6];
+        for ball in balls {
+            let force = self.force(ball);
+            if force != Vector::new(0.0, 0.0, 0.0) {
+                let torques = hand.torques(ball.point, ball.joints, force);
+                sum.iter_mut().zip(torques).for_each(|(sum, torque)| *sum += torque);
+            }
+        }
+        sum
+    }
+
+    /// The force on a ball, in N.
+    fn force(&self, ball: &Ball) -> Point {
+        let under = self.scene.table - ball.point.z + ball.radius;
+        let table = UP * (STIFFNESS * under.max(0.0));
+        let free = self.objects.iter().enumerate().filter(|(index, object)| {
+            !object.is_carried && !self.is_left_to_pads(*index, ball)
+        });
+        let solids = self.walls.iter().map(|(frame, solid)| (frame, *solid));
+        let solids = solids.chain(free.map(|(_, object)| (&object.frame, object.solid)));
+        let touches = solids.filter_map(|(frame, solid)| solid.touch(frame, ball.point, ball.radius));
+        touches.fold(table, |sum, touch| sum + touch.normal * (STIFFNESS * touch.depth))
+    }
+}
+
+/// The names of the objects, for a text.
+impl World {
+    /// A line for each object: its name, form and place.
+    #[must_use]
+    pub fn describe(&self) -> Vec<String> {
+        let line = |object: &Object| {
+            let Vector { x, y, z } = object.frame.origin;
+            let form = match object.item.form {
+                Form::Cube { .. } => "cube",
+                Form::Cylinder { .. } => "cylinder",
+            };
+            let carried = if object.is_carried { ", carried" } else { "" };
+            alloc::format!("{} {form} at {x:.1} {y:.1} {z:.1}{carried}", object.item.name)
+        };
+        self.objects.iter().map(line).collect()
+    }
+}
