@@ -183,8 +183,9 @@ impl JointState {
             self.let_go.follow(now, answer);
             return Protected::Freed;
         }
-        if self.drive.is_engaged() && registers.get(PROTECTION.address) != 0 {
-            let Reading { load, speed, .. } = answer.reading;
+        let Reading { load, speed, .. } = answer.reading;
+        let is_believed = self.drive.is_engaged() && !self.position.is_doubtful(speed);
+        if is_believed && registers.get(PROTECTION.address) != 0 {
             let push = push_from_servo(self.joint, load, speed);
             let sample = PushSample { angle, push, is_saturated: load.saturating_abs() >= FULL_LOAD };
             if self.obstacle.measured(now, sample, set_point, self.push_limit(registers)) {

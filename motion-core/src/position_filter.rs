@@ -24,6 +24,9 @@ const COUNTS_PER_SECOND: u32 = 2_000;
 const SINKING_COUNTS_PER_SECOND: u32 = 60;
 /// So old a reading says the least about a joint that sinks: 15 counts more.
 const SINKS_FOR_MILLIS: u32 = 250;
+/// After a longer pause a false position is within reach of the previous answer, and so far away that a joint whose set-point
+/// follows it would jump.
+const LONG_PAUSE_MILLIS: u32 = 30;
 /// The largest difference between two readings of a joint at rest.
 const JITTER_COUNTS: u32 = 8;
 
@@ -47,8 +50,8 @@ pub struct PositionFilter {
     last_micros: u16,
     /// The last accepted position, in servo counts; `None` while the servo is silent.
     position: Option<u16>,
-    /// Were the last two answers nearly equal?
-    is_steady: bool,
+    /// The distance between the last two answers in servo counts, and the time between them in milliseconds.
+    step: (u32, u32),
     /// Consecutive reads without an accepted answer.
     failures: u8,
     ask_again_at: Instant,
@@ -60,7 +63,7 @@ impl PositionFilter {
         last: None,
         last_micros: 0,
         position: None,
-        is_steady: false,
+        step: (u32::MAX, 0),
         failures: 0,
         ask_again_at: Instant::ZERO,
     };
@@ -72,7 +75,7 @@ impl PositionFilter {
         });
         let last_millis = u32::from(core::mem::replace(&mut self.last_micros, answer_micros)) / 1_000;
         let agrees = distance <= travel(millis + last_millis, COUNTS_PER_SECOND);
-        self.is_steady = distance <= travel(millis.min(SINKS_FOR_MILLIS), SINKING_COUNTS_PER_SECOND);
+        self.step = (distance, millis);
         self.last = Some((counts, now));
         if agrees {
             self.position = Some(counts);
@@ -113,8 +116,20 @@ impl PositionFilter {
     /// Is the joint at rest according to the last two answers? If one of them is damaged, they are hardly ever nearly
     /// equal.
     #[must_use]
-    pub const fn is_steady(&self) -> bool {
-        self.is_steady
+    pub fn is_steady(&self) -> bool {
+        let (distance, millis) = self.step;
+        distance <= travel(millis.min(SINKS_FOR_MILLIS), SINKING_COUNTS_PER_SECOND)
+    }
+
+    /// Has the joint jumped in a long pause, further than the speed explains that its servo measured with the last answer, in
+    /// counts per second? Then the answer may be damaged.
+    #[must_use]
+    pub fn is_doubtful(&self, speed: i16) -> bool {
+        let (distance, millis) = self.step;
+        let speed = u32::from(speed.unsigned_abs());
+        // It may have been twice as fast before.
+        let is_explained = speed <= COUNTS_PER_SECOND && distance <= travel(millis, 2 * speed);
+        millis > LONG_PAUSE_MILLIS && !self.is_steady() && !is_explained
     }
 
     /// Was the last answer at most two control cycles ago?
@@ -207,6 +222,28 @@ mod tests {
         assert!(!filter.is_steady());
         assert_eq!(filter.answered(at_ms(320), 0, 403), FilterOutcome::Accepted(403));
         assert!(filter.is_steady());
+    }
+
+    #[test]
+    fn a_jump_after_a_long_pause_is_doubtful_unless_the_speed_explains_it() {
+        let mut filter = PositionFilter::UNKNOWN;
+        filter.answered(at_ms(0), 0, 541);
+        filter.answered(at_ms(10), 0, 541);
+        let doubtful = [
+            (20, 565, 0, false),
+            (140, 670, 0, true),
+            (300, 541, 0, true),
+            (310, 541, 0, false),
+            (410, 641, 600, false),
+            (510, 741, -600, false),
+            (610, 841, 400, true),
+            (710, 641, 16_935, true),
+            (810, 646, 16_935, false),
+        ];
+        for (millis, counts, speed, is_doubtful) in doubtful {
+            assert_eq!(filter.answered(at_ms(millis), 0, counts), FilterOutcome::Accepted(counts));
+            assert_eq!(filter.is_doubtful(speed), is_doubtful, "{counts} at {millis} ms");
+        }
     }
 
     #[test]

@@ -104,6 +104,33 @@ fn d27_a_set_point_that_gave_way_never_turns_back_a_joint_that_turned_past_it() 
     assert!(!moments.is_sorted_by_key(|(_, goal)| goal), "it never gave way: {moments:?}");
 }
 
+/// One damaged answer in 256 passes its checksum. After a pause its position is within reach.
+#[test]
+fn d27_a_false_position_after_a_pause_does_not_move_the_set_point_of_a_joint_that_is_held() {
+    let (mut joints, mut registers) = measured(MotorState::Servo);
+    joints.take_torque(true);
+    joints.joint_mut(J1).unwrap().move_to(180, 0);
+    registers.set(SPEED.of(J1), 90);
+    let mut measure = |millis: u64, position, load| {
+        let reading = Reading { load, ..answer(position).reading };
+        joints.measured(
+            at_ms(millis),
+            J1,
+            &Answer { reading, alarms: 0, ..answer(position) },
+            true,
+            &mut registers,
+        );
+        joints.advance(at_ms(millis), at_ms(millis) + CYCLE, &mut registers);
+        let goal = joints.goals(at_ms(millis), &registers).find(|(joint, _)| *joint == J1);
+        goal.unwrap().1
+    };
+    // A wall at 511 counts.
+    let held = (20..1_000).step_by(10).map(|millis| measure(millis, 511, 710)).last().unwrap();
+    assert!((512..600).contains(&held), "it gave way: {held}");
+    let goals = [(1_120, 640), (1_280, 511), (1_290, 511)].map(|(millis, at)| measure(millis, at, 710));
+    assert!(goals.iter().all(|goal| goal.abs_diff(held) < 8), "{goals:?} after {held}");
+}
+
 #[test]
 fn d25_a_set_point_does_not_follow_a_joint_out_of_the_linkage() {
     let [_, two, three, ..] = Joint::ALL;
