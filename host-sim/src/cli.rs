@@ -10,6 +10,7 @@ use tracing::level_filters::LevelFilter;
 use crate::eeprom::Eeprom;
 use crate::help::lesson;
 use arm_sim::faults::ArmFault;
+use arm_sim::scene::{Scene, SceneError};
 use arm_sim::usb_adapter::Latency;
 
 /// The default chip id of a simulated arm: "SIM" and 1.
@@ -90,6 +91,10 @@ pub struct Options {
     #[arg(long = "fault", value_name = "JOINT=KIND")]
     pub faults: Vec<ArmFault>,
 
+    /// Put the scene in FILE on the table: cubes, cylinders and walls, see docs/simulation.md
+    #[arg(long, value_name = "FILE", value_parser = scene, conflicts_with_all = ["servos", "servo_socket", "servos_only"])]
+    pub scene: Option<Scene>,
+
     /// Run only the seven servos, for another controller to drive through a unix socket at PATH
     #[arg(
         long,
@@ -167,6 +172,13 @@ fn ids(text: &str) -> Result<Ids, &'static str> {
 }
 
 /// Parses the name of one of the two published tables of register 40.
+fn scene(path: &str) -> Result<Scene, String> {
+    std::fs::read_to_string(path)
+        .map_err(|why| why.to_string())?
+        .parse()
+        .map_err(|why: SceneError| why.to_string())
+}
+
 fn torque_codes(word: &str) -> Result<TorqueCodes, &'static str> {
     match word {
         "older" => Ok(TorqueCodes::DampingOnFree),

@@ -7,6 +7,7 @@ use std::io::{self, BufWriter, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use arm_sim::Action;
 use arm_sim::controller::ArmController;
 use arm_sim::flash::Flash;
 use arm_sim::plant::Plant;
@@ -235,6 +236,9 @@ fn simulated_arm<C: ArmController>(
         arm.simulation_mut().set_recorder(file);
     }
     options.faults.iter().for_each(|&fault| arm.set_fault(Instant::ZERO, fault));
+    if let Some(scene) = &options.scene {
+        arm.act(Instant::ZERO, Action::Scene(Some(scene.clone())));
+    }
     arm.simulation_mut().advance(clock.now(), true);
     Ok(arm)
 }

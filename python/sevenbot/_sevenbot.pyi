@@ -990,6 +990,16 @@ class Simulation:
     def load_grams(self, value: int, /) -> None: ...
     def drop_load(self) -> None:
         """Drops what is in the gripper: the thing between the claws, and the weight."""
+    @property
+    def scene(self) -> str | None:
+        """What stands on the table, as text: `"cube red 30 40 0 200; cylinder can 40 60 100 -80 200"`. docs/simulation.md describes it.
+        `None` is no table. Setting it puts everything in its place.
+        """
+    @scene.setter
+    def scene(self, value: str | None, /) -> None: ...
+    @property
+    def things(self) -> dict[str, list[float]]:
+        """Where the middle of each thing of the scene is, by its name: x, y and z in mm."""
     def trip(self, joint: int, alarm: Literal["overload", "heat"] = "overload") -> None:
         """Forces an alarm on a joint's servo, which switches its motor off: `"overload"`, until its torque is switched off
         and on, or `"heat"`, until it has cooled down. An overload has no effect on a joint without torque.

@@ -1,10 +1,13 @@
 //! `Simulation`: the arm behind `Arm.simulated()`, its clock, faults and hands.
 
+use std::collections::BTreeMap;
 use std::sync::Mutex;
 use std::time::Duration;
 
 use arm_sim::faults::{ArmFault, FaultLocation};
 use arm_sim::plant::HEAVIEST_LOAD_G;
+use arm_sim::scene::SceneError;
+use arm_sim::world::Object;
 use motion_core::calibration::{MicroDegrees, counts_from_angle};
 use pyo3::prelude::*;
 use sevenbot::Joint;
@@ -204,6 +207,35 @@ impl Simulation {
     /// Drops what is in the gripper: the thing between the claws, and the weight.
     fn drop_load(&self, py: Python<'_>) -> PyResult<()> {
         self.with(py, |arm| drop(arm.act(arm_sim::Action::Drop)))
+    }
+
+    /// What stands on the table, as text: `"cube red 30 40 0 200; cylinder can 40 60 100 -80 200"`. docs/simulation.md describes it.
+    /// `None` is no table. Setting it puts everything in its place.
+    #[getter]
+    fn scene(&self, py: Python<'_>) -> PyResult<Option<String>> {
+        let scene =
+            |arm: &mut arm_sim::Simulation| arm.plant().world().map(|world| world.scene().to_string());
+        self.with(py, scene)
+    }
+
+    #[setter]
+    fn set_scene(&self, py: Python<'_>, scene: Option<&str>) -> PyResult<()> {
+        let scene = scene.map(str::parse).transpose();
+        let scene = scene.map_err(|error: SceneError| InvalidValue::raise(py, &error.to_string()))?;
+        self.with(py, |arm| drop(arm.act(arm_sim::Action::Scene(scene))))
+    }
+
+    /// Where the middle of each thing of the scene is, by its name: x, y and z in mm.
+    #[getter]
+    fn things(&self, py: Python<'_>) -> PyResult<BTreeMap<String, [f64; 3]>> {
+        self.with(py, |arm| {
+            let objects = arm.plant().world().map_or(&[][..], |world| world.objects());
+            let place = |object: &Object| {
+                let at = object.frame.origin;
+                (object.item.name.clone(), [at.x, at.y, at.z])
+            };
+            objects.iter().map(place).collect()
+        })
     }
 
     /// Forces an alarm on a joint's servo, which switches its motor off: `"overload"`, until its torque is switched off

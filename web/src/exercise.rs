@@ -1,6 +1,7 @@
 //! What the arm measures, for an exercise.
 
-use exercises::Observation;
+use arm_sim::world::{Object, World};
+use exercises::{Observation, SeenThing};
 use protocol_core::time::Instant;
 use sevenbot::Snapshot;
 use sevenbot::map::BLOCKED_JOINTS;
@@ -8,23 +9,31 @@ use sevenbot::map::BLOCKED_JOINTS;
 use crate::arm_state::ArmState;
 use crate::stop::since_start;
 
-/// What these registers of the arm say at `now`.
+/// What these registers of the arm say at `now`, and what is in its room.
 #[must_use]
-pub fn observation(now: Instant, registers: &Snapshot) -> Observation {
+pub fn observation(now: Instant, registers: &Snapshot, world: Option<&World>) -> Observation {
     let state = ArmState::new(registers);
     Observation {
         seconds: since_start(now).as_secs_f64(),
         tip: state.tip(),
         joints: state.answered().map(|angle| angle.map(f64::from)),
         blocked: registers.byte(&BLOCKED_JOINTS),
+        things: world.map(seen_things).unwrap_or_default(),
     }
+}
+
+fn seen_things(world: &World) -> Vec<SeenThing> {
+    let seen = |object: &Object| {
+        let at = object.frame.origin;
+        SeenThing { name: object.item.name.clone(), at: [at.x, at.y, at.z], is_carried: object.is_carried }
+    };
+    world.objects().iter().map(seen).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use exercises::{Attempt, SolutionPart, shipped};
 
-    use super::*;
     use crate::program::ProgramProgress;
     use crate::tab::Tab;
 
@@ -36,7 +45,7 @@ mod tests {
                 SolutionPart::Repair => tab.act("clear"),
                 SolutionPart::Program(program) => {
                     let watch = |_, tab: &mut Tab| {
-                        attempt.observe(&observation(tab.now(), tab.client.registers()));
+                        attempt.observe(&tab.observation());
                     };
                     ends.push(tab.run(program, watch).0);
                     // The hold after a failed program is confirmed.
@@ -63,7 +72,7 @@ mod tests {
     #[test]
     fn a_silent_joint_is_nowhere() {
         let mut tab = Tab::new();
-        let seen = |tab: &Tab| observation(tab.now(), tab.client.registers());
+        let seen = |tab: &Tab| tab.observation();
         assert!(seen(&tab).tip.is_some() && seen(&tab).joints[2].is_some());
         tab.act("fault 3=missing");
         tab.pass(60);
@@ -77,7 +86,7 @@ mod tests {
             let (mut tab, mut attempt) = (Tab::new(), Attempt::new(&exercise));
             for _ in 0..200 {
                 tab.pass(1);
-                attempt.observe(&observation(tab.now(), tab.client.registers()));
+                attempt.observe(&tab.observation());
             }
             assert!(attempt.reached().all(|is_reached| !is_reached), "{}", exercise.title.of("en"));
         }

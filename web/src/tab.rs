@@ -1,11 +1,13 @@
 //! A page and its simulated arm, for tests: a picture each 1/60 s of virtual time.
 
 use block_programs::Program;
+use exercises::Observation;
 use protocol_core::time::Instant;
 use sevenbot::Joint;
 use sevenbot::map::{SPEED, TIME};
 
 use crate::client::Client;
+use crate::exercise::observation;
 use crate::program::{Pace, ProgramProgress, ProgramRun};
 use crate::source::Source;
 use crate::source::simulator::SimulatedSource;
@@ -40,6 +42,11 @@ impl Tab {
 
     pub(crate) fn now(&self) -> Instant {
         self.arm.now()
+    }
+
+    /// What an exercise sees.
+    pub(crate) fn observation(&self) -> Observation {
+        observation(self.now(), self.client.registers(), self.arm.simulation().plant().world())
     }
 
     pub(crate) fn act(&mut self, action: &str) {

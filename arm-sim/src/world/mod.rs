@@ -21,13 +21,12 @@ mod frame;
 mod hand;
 mod solid;
 
-use alloc::string::String;
 use alloc::vec::Vec;
 
 use kinematics::Vector;
 use protocol_core::registers::JOINTS;
 
-use crate::scene::{Block, Form, Item, Scene, Tool};
+use crate::scene::{Block, Item, Scene, Tool};
 pub use frame::Frame;
 use frame::{Point, UP};
 use hand::{Ball, Grip, Hand, angle_for};
@@ -395,23 +394,5 @@ impl World {
         let solids = solids.chain(free.map(|(_, object)| (&object.frame, object.solid)));
         let touches = solids.filter_map(|(frame, solid)| solid.touch(frame, ball.point, ball.radius));
         touches.fold(table, |sum, touch| sum + touch.normal * (STIFFNESS * touch.depth))
-    }
-}
-
-/// The names of the objects, for a text.
-impl World {
-    /// A line for each object: its name, form and place.
-    #[must_use]
-    pub fn describe(&self) -> Vec<String> {
-        let line = |object: &Object| {
-            let Vector { x, y, z } = object.frame.origin;
-            let form = match object.item.form {
-                Form::Cube { .. } => "cube",
-                Form::Cylinder { .. } => "cylinder",
-            };
-            let carried = if object.is_carried { ", carried" } else { "" };
-            alloc::format!("{} {form} at {x:.1} {y:.1} {z:.1}{carried}", object.item.name)
-        };
-        self.objects.iter().map(line).collect()
     }
 }

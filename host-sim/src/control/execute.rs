@@ -68,6 +68,7 @@ impl<F: NorFlash + Clone, C: ArmController> Executor<'_, F, C> {
             ControlRequest::Hand { joint, to } => self.hand(joint, to),
             ControlRequest::Weight { grams } => self.weight(grams),
             ControlRequest::Drop => Ok(json!({ "ended": self.act(Action::Drop) })),
+            ControlRequest::Scene { scene } => self.scene(&scene),
             ControlRequest::Trip { joint, alarm } => self.trip(joint, alarm),
             ControlRequest::Power { to } => self.power(to),
             ControlRequest::Restart => self.act_with_power(Action::RestartController),
@@ -196,6 +197,14 @@ impl<F: NorFlash + Clone, C: ArmController> Executor<'_, F, C> {
         };
         self.act(Action::Trip(joint, trip));
         Ok(json!({}))
+    }
+
+    fn scene(&mut self, text: &str) -> Result<Value, ControlRefusal> {
+        const HINT: &str = "docs/simulation.md describes scenes; off takes the scene away";
+        let scene = (text != "off").then(|| text.parse()).transpose();
+        let scene = scene.map_err(|error| ControlRefusal::new(error, HINT))?;
+        self.act(Action::Scene(scene));
+        Ok(json!({ "objects": state::objects(self.arm.simulation_mut().plant()) }))
     }
 
     fn weight(&mut self, grams: u16) -> Result<Value, ControlRefusal> {

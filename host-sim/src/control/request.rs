@@ -40,6 +40,11 @@ pub enum ControlRequest {
     },
     /// Drops what is in the gripper: the thing between the claws, and the weight.
     Drop,
+    /// Puts a scene on the table round the arm.
+    Scene {
+        /// The scene; `off` takes it away.
+        scene: String,
+    },
     /// Forces an alarm on a servo.
     Trip {
         /// The joint, 1 to 7.

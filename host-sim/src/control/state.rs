@@ -3,6 +3,7 @@
 use arm_sim::controller::ArmController;
 use arm_sim::faults::FaultReport;
 use arm_sim::plant::Plant;
+use arm_sim::world::Object;
 use embedded_storage::nor_flash::NorFlash;
 use motion_core::servo_bus::Torque;
 use protocol_core::registers::map::{
@@ -39,11 +40,28 @@ pub fn of<F: NorFlash + Clone, C: ArmController>(pty_arm: &mut PtyArm<F, Plant, 
         "controller": if !arm.has_power() { "off" } else if arm.is_halted() { "halted" } else { "running" },
         "supply_volts": f64::from(plant.supply_decivolts()) / 10.0,
         "weight_grams": plant.load_grams(),
+        "objects": objects(plant),
         "joints": Joint::ALL.map(|joint| self::joint(plant, joint)),
         "registers": arm.controller().registers().map(registers),
         "faults": faults,
         "ended_faults": ended_faults,
     })
+}
+
+/// What stands on the table, and what the arm carries.
+pub(super) fn objects(plant: &Plant) -> Vec<Value> {
+    let objects = plant.world().map_or(&[][..], |world| world.objects());
+    let of = |object: &Object| {
+        let at = object.frame.origin;
+        let tenths = |mm: f64| (mm * 10.0).round() / 10.0;
+        json!({
+            "name": object.item.name,
+            "place_mm": [tenths(at.x), tenths(at.y), tenths(at.z)],
+            "turn_degrees": tenths(object.frame.turn()),
+            "is_carried": object.is_carried,
+        })
+    };
+    objects.iter().map(of).collect()
 }
 
 fn joint(plant: &Plant, joint: Joint) -> Value {

@@ -8,7 +8,7 @@ use crate::path::{PathProgress, distance};
 const AT_REST: f64 = 0.5;
 
 /// What the arm measures at one time.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Observation {
     /// The time in seconds, from any start.
     pub seconds: f64,
@@ -18,6 +18,19 @@ pub struct Observation {
     pub joints: [Option<f64>; 7],
     /// The joints that are blocked, as register 195 shows them.
     pub blocked: u8,
+    /// The things on the table.
+    pub things: Vec<SeenThing>,
+}
+
+/// Where a thing on the table is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SeenThing {
+    /// Its name.
+    pub name: String,
+    /// Its middle: x, y, z in mm.
+    pub at: [f64; 3],
+    /// Does the arm carry it?
+    pub is_carried: bool,
 }
 
 #[derive(Clone, Debug)]
@@ -25,7 +38,7 @@ enum Progress {
     Reached,
     Open,
     Along(PathProgress),
-    /// The joint has been at its angle since this time, in seconds.
+    /// The joint has been at its angle, or the thing in its place, since this time, in seconds.
     There(f64),
 }
 
@@ -107,17 +120,26 @@ fn is_reached(goal: &Goal, progress: &mut Progress, seen: &Observation) -> bool 
         },
         Goal::Joint { joint, degrees, within, .. } => {
             let at = seen.joints.get(usize::from(joint.saturating_sub(1))).copied().flatten();
-            if !at.is_some_and(|at| (at - degrees).abs() <= *within) {
-                *progress = Progress::Open;
-            } else if !matches!(progress, Progress::There(_)) {
-                *progress = Progress::There(seen.seconds);
-            }
-            matches!(progress, Progress::There(since) if seen.seconds - *since >= AT_REST)
+            rests(progress, seen.seconds, at.is_some_and(|at| (at - degrees).abs() <= *within))
+        }
+        Goal::Thing { thing, at, within, .. } => {
+            let found = seen.things.iter().find(|seen| seen.name == *thing && !seen.is_carried);
+            rests(progress, seen.seconds, found.is_some_and(|seen| distance(seen.at, *at) <= *within))
         }
         Goal::Blocked { blocked, .. } => {
             1_u8.checked_shl(u32::from(blocked.saturating_sub(1))).is_some_and(|bit| seen.blocked & bit != 0)
         }
     }
+}
+
+/// Has something been where it should be for long enough?
+fn rests(progress: &mut Progress, seconds: f64, is_there: bool) -> bool {
+    if !is_there {
+        *progress = Progress::Open;
+    } else if !matches!(progress, Progress::There(_)) {
+        *progress = Progress::There(seconds);
+    }
+    matches!(progress, Progress::There(since) if seconds - *since >= AT_REST)
 }
 
 #[cfg(test)]
@@ -144,6 +166,27 @@ mod tests {
         assert!((attempt.duration() - 1.2).abs() < 1e-9);
         assert!(!attempt.observe(&seen(9.0, 0.0)) && attempt.is_solved(), "it stays solved");
         assert!((attempt.duration() - 1.2).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_thing_that_is_carried_over_its_place_is_not_there() {
+        let mut attempt = attempt(r#"{"text": "t", "thing": "red", "at": [80, 200, -45]}"#, "");
+        let seen = |seconds, name: &str, x, is_carried| Observation {
+            seconds,
+            things: vec![SeenThing { name: name.to_owned(), at: [x, 200.0, -45.0], is_carried }],
+            ..Observation::default()
+        };
+        for (seconds, name, x, is_carried) in [
+            (0.0, "red", 80.0, true),
+            (1.0, "red", 81.0, false),
+            (1.2, "red", 120.0, false),
+            (2.0, "blue", 80.0, false),
+        ] {
+            assert!(!attempt.observe(&seen(seconds, name, x, is_carried)));
+            assert!(!attempt.observe(&seen(seconds + 0.1, name, x, is_carried)));
+        }
+        assert!(!attempt.observe(&seen(3.0, "red", 90.0, false)));
+        assert!(attempt.observe(&seen(3.5, "red", 90.0, false)) && attempt.is_solved());
     }
 
     #[test]

@@ -12,7 +12,10 @@ const PATH_WITHIN: f64 = 8.0;
 /// By default a joint is at an angle within this, in degrees.
 const JOINT_WITHIN: f64 = 2.0;
 
-/// A goal in a file: one of the four kinds.
+/// By default a thing is at a place within this distance, in mm.
+const THING_WITHIN: f64 = 15.0;
+
+/// A goal in a file: one of the five kinds.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct GoalInFile {
@@ -22,6 +25,8 @@ struct GoalInFile {
     joint: Option<u8>,
     degrees: Option<f64>,
     blocked: Option<u8>,
+    thing: Option<String>,
+    at: Option<[f64; 3]>,
     within: Option<f64>,
 }
 
@@ -58,6 +63,17 @@ pub enum Goal {
         /// How near, in degrees.
         within: f64,
     },
+    /// A thing on the table stands at a place, and the arm does not carry it.
+    Thing {
+        /// The goal in words.
+        text: Text,
+        /// Its name in the scene.
+        thing: String,
+        /// Where its middle has to be: x, y, z in mm.
+        at: [f64; 3],
+        /// How near, in mm.
+        within: f64,
+    },
     /// A joint is blocked by an obstacle.
     Blocked {
         /// The goal in words.
@@ -71,19 +87,24 @@ impl TryFrom<GoalInFile> for Goal {
     type Error = &'static str;
 
     fn try_from(found: GoalInFile) -> Result<Self, Self::Error> {
-        let GoalInFile { text, tip, path, joint, degrees, blocked, within } = found;
-        match (tip, path, joint.zip(degrees), blocked) {
-            (Some(tip), None, None, None) => {
+        let GoalInFile { text, tip, path, joint, degrees, blocked, thing, at, within } = found;
+        match (tip, path, joint.zip(degrees), blocked, thing.zip(at)) {
+            (Some(tip), None, None, None, None) => {
                 Ok(Self::Tip { text, tip, within: within.unwrap_or(TIP_WITHIN) })
             }
-            (None, Some(path), None, None) => {
+            (None, Some(path), None, None, None) => {
                 Ok(Self::Path { text, path, within: within.unwrap_or(PATH_WITHIN) })
             }
-            (None, None, Some((joint, degrees)), None) => {
+            (None, None, Some((joint, degrees)), None, None) => {
                 Ok(Self::Joint { text, joint, degrees, within: within.unwrap_or(JOINT_WITHIN) })
             }
-            (None, None, None, Some(blocked)) => Ok(Self::Blocked { text, blocked }),
-            _ => Err("a goal has \"tip\", \"path\", \"joint\" with \"degrees\", or \"blocked\""),
+            (None, None, None, Some(blocked), None) => Ok(Self::Blocked { text, blocked }),
+            (None, None, None, None, Some((thing, at))) => {
+                Ok(Self::Thing { text, thing, at, within: within.unwrap_or(THING_WITHIN) })
+            }
+            _ => Err(
+                "a goal has \"tip\", \"path\", \"joint\" with \"degrees\", \"thing\" with \"at\", or \"blocked\"",
+            ),
         }
     }
 }
@@ -96,6 +117,7 @@ impl Goal {
             Self::Tip { text, .. }
             | Self::Path { text, .. }
             | Self::Joint { text, .. }
+            | Self::Thing { text, .. }
             | Self::Blocked { text, .. } => text,
         }
     }
@@ -103,7 +125,7 @@ impl Goal {
     /// Why it can never be reached.
     pub(crate) fn fault(&self) -> Option<&'static str> {
         let (within, is_possible, fault) = match self {
-            Self::Tip { within, .. } => (*within, true, ""),
+            Self::Tip { within, .. } | Self::Thing { within, .. } => (*within, true, ""),
             Self::Path { path, within, .. } => {
                 (*within, (2..=MOST_POINTS).contains(&path.len()), "a path has 2 to 100 points")
             }

@@ -16,7 +16,7 @@ mod shipped;
 mod solution;
 mod text;
 
-pub use attempt::{Attempt, Observation};
+pub use attempt::{Attempt, Observation, SeenThing};
 pub use exercise::{Exercise, ExerciseError};
 pub use goal::Goal;
 pub use shipped::shipped;

@@ -2,11 +2,14 @@
 
 use crate::exercise::Exercise;
 
-const FILES: [&str; 5] = [
+const FILES: [&str; 8] = [
     include_str!("../shipped/first-move.json"),
     include_str!("../shipped/five-points.json"),
     include_str!("../shipped/square.json"),
     include_str!("../shipped/stairs.json"),
+    include_str!("../shipped/pick-and-place.json"),
+    include_str!("../shipped/sort.json"),
+    include_str!("../shipped/stack.json"),
     include_str!("../shipped/blocked.json"),
 ];
 

@@ -13,10 +13,20 @@ pub(crate) enum Step {
     Tip(f64, f64, f64, f64),
     /// The tip along a straight line to x, y, z in mm, at mm per second, the tool down.
     Line(f64, f64, f64, f64),
+    /// Opens the claws, or closes them.
+    Grip(Claws),
     /// Seconds.
     Wait(f64),
     /// The obstacles of the simulated arm are taken away, and its joints try again.
     Repair,
+}
+
+/// Where the claws go.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum Claws {
+    Open,
+    Close,
 }
 
 /// A part of a solution.
@@ -73,6 +83,10 @@ fn block(step: &Step) -> Option<Value> {
         }
         Step::Line(x, y, z, speed) => {
             with("arm_line", down(), &[("X", x), ("Y", y), ("Z", z), ("SPEED", speed)])
+        }
+        Step::Grip(claws) => {
+            let state = if matches!(claws, Claws::Open) { "OPEN" } else { "CLOSE" };
+            with("arm_grip", json!({"STATE": state}), &[])
         }
         Step::Wait(seconds) => with("arm_wait", json!({}), &[("SECONDS", seconds)]),
         Step::Repair => None,

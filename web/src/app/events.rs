@@ -1,5 +1,6 @@
 //! What a person does: clicks, keys, sliders, the pointer on the picture, files.
 
+use arm_sim::scene::Scene;
 use protocol_core::time::Instant;
 use sevenbot::map::{FINE_TARGET, MOTOR_STATE, SPEED, TARGET_POSITION, motor_state};
 use sevenbot::{Span, register_values};
@@ -72,6 +73,7 @@ impl App {
                 self.act("fault", "7=thing=30");
             }
             "drop" => self.act_on_simulation("drop"),
+            "scene" => self.act_on_simulation(&format!("scene {}", self.dom.choice("scene"))),
             "fault" => self.act_on_simulation(&format!("fault {value}")),
             "repair" => self.repair(),
             "power" => self.act_on_simulation("power-cycle"),
@@ -195,6 +197,14 @@ impl App {
         }
     }
 
+    /// A file with a scene was opened.
+    fn open_scene(&mut self, text: String) {
+        match text.parse::<Scene>() {
+            Ok(scene) => self.act_on_simulation(&format!("scene {scene}")),
+            Err(error) => self.dom.notice(&format!("{} {error}", self.language.text("no-scene"))),
+        }
+    }
+
     fn slid(&mut self, event: &Event) {
         let Some(slider) = event.target().and_then(|target| target.dyn_into::<HtmlInputElement>().ok())
         else {
@@ -226,6 +236,7 @@ impl App {
             "source" => self.choose_source(),
             "upload" => files::read(&element, Self::open_recording),
             "open-program" => files::read(&element, Self::open_program),
+            "open-scene" => files::read(&element, Self::open_scene),
             "open-exercise" => files::read(&element, Self::open_exercise),
             "exercise-choice" => self.choose_exercise(),
             "joint-speed" => self.choose_speed(),

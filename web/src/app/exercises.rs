@@ -79,8 +79,9 @@ impl App {
 
     /// Tells the exercise where the arm is.
     pub(super) fn observe_exercise(&mut self, now: Instant) {
+        let seen = observation(now, self.client.registers(), self.world());
         let Some(attempt) = &mut self.exercises.attempt else { return };
-        if attempt.observe(&observation(now, self.client.registers())) {
+        if attempt.observe(&seen) {
             self.show_exercise();
         }
     }

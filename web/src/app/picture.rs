@@ -1,12 +1,13 @@
 //! The arm in 3D and the plot, before each picture of the browser.
 
+use arm_sim::world::World;
 use sevenbot::map::{fault, motor_state};
 
-use super::page::{App, whole};
+use super::page::{App, Line, whole};
 use super::panels;
 use crate::arm_state::ArmState;
 use crate::plots::{Plot, Quantity, draw};
-use crate::scene::{Rgb, Theme, View};
+use crate::scene::{Rgb, Theme, View, things};
 
 /// The plot is drawn with every third picture.
 const PLOT_PERIOD: u32 = 3;
@@ -25,6 +26,7 @@ impl App {
             targets: (state.motor_state == motor_state::SERVO).then_some(state.targets),
             colours: colours(&state, theme),
             unreachable: self.unreachable.map(|(tip, _)| tip),
+            things: self.world().map(things).unwrap_or_default(),
             hovered: self.hovered,
             theme,
         };
@@ -38,6 +40,14 @@ impl App {
             self.show_plot(theme);
         }
         panels::show(self, &state);
+    }
+
+    /// The room of the simulated arm.
+    pub(super) fn world(&self) -> Option<&World> {
+        match &self.line {
+            Line::Simulated(source) => source.simulation().plant().world(),
+            _ => None,
+        }
     }
 
     fn show_plot(&self, theme: Theme) {

@@ -36,7 +36,7 @@ pub struct Scene {
 }
 
 /// What a picture depends on.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 struct Picture {
     view: View,
     camera: Camera,
@@ -69,8 +69,8 @@ impl Scene {
         }
         self.resize();
         let pixels = [self.canvas.width(), self.canvas.height()];
-        let picture = Picture { view: *view, camera: self.camera, pixels };
-        if self.gl.is_context_lost() || self.drawn == Some(picture) {
+        let picture = Picture { view: view.clone(), camera: self.camera, pixels };
+        if self.gl.is_context_lost() || self.drawn.as_ref() == Some(&picture) {
             return Ok(false);
         }
         let Some(renderer) = &self.renderer else { return Ok(false) };

@@ -18,6 +18,7 @@ pub mod pointer;
 mod renderer;
 mod shaders;
 pub mod theme;
+pub mod things;
 pub mod view;
 
 pub use arm::{Angles, Part};
@@ -26,4 +27,5 @@ pub use canvas::Scene;
 pub use drag::{Refusal, TipWish, Unreachable, wish};
 pub use pointer::{Button, SceneEvent};
 pub use theme::{Rgb, Theme};
+pub use things::things;
 pub use view::View;

@@ -1,7 +1,7 @@
 //! Draws a view with WebGL2.
 //!
 //! ```text
-//!   table ─▶ grid ─▶ shadow (stencil: once a pixel) ─▶ arm ─▶ ghost (depth first, so that it is one layer) ─▶ markers
+//!   table ─▶ grid ─▶ shadow (stencil: once a pixel) ─▶ things, arm ─▶ ghost (depth first, so that it is one layer) ─▶ markers
 //! ```
 
 use std::collections::HashMap;
@@ -16,6 +16,7 @@ use super::camera::Camera;
 use super::lines::{LineEnd, Lines, TABLE};
 use super::shaders;
 use super::theme::{Palette, Rgb};
+use super::things::triangles;
 use super::view::View;
 
 /// Numbers of one corner of the arm: position, normal, body and finish.
@@ -98,9 +99,10 @@ impl Renderer {
             self.draw_lines(Gl::LINES, &lines.ground, projection);
             self.draw_shadow(view, palette, projection);
         });
-        self.use_arm(view, palette);
         let own = Look { tint: Vec4::ZERO, shading: 1.0, opacity: 1.0 };
         gl.enable(Gl::DEPTH_TEST);
+        self.draw_lines(Gl::TRIANGLES, &triangles(&view.things, palette), projection);
+        self.use_arm(view, palette);
         self.draw_bodies(view.measured, projection, &own);
         if let Some(ghost) = view.ghost() {
             self.draw_ghost(ghost, palette, projection);

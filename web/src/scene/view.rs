@@ -4,9 +4,10 @@ use glam::Vec3;
 
 use super::arm::{Angles, Part};
 use super::theme::{Rgb, Theme};
+use super::things::Thing;
 
 /// What the scene shows. Two equal views have the same picture.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct View {
     /// Measured angles of joints 1 to 7, in degrees.
     pub measured: Angles,
@@ -17,6 +18,8 @@ pub struct View {
     pub colours: [Rgb; 7],
     /// A wanted position of the tip, in mm, that the arm cannot reach.
     pub unreachable: Option<Vec3>,
+    /// What stands on the table, and what the arm carries.
+    pub things: Vec<Thing>,
     /// The part under the pointer or with the keyboard's focus.
     pub hovered: Option<Part>,
     /// Light or dark.
@@ -30,6 +33,7 @@ impl Default for View {
             targets: None,
             colours: [Theme::Light.palette().joint_ok; 7],
             unreachable: None,
+            things: Vec::new(),
             hovered: None,
             theme: Theme::Light,
         }

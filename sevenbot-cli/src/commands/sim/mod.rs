@@ -4,9 +4,11 @@ mod socket;
 mod text;
 mod values;
 
-use std::path::PathBuf;
+use std::fmt::Display;
+use std::path::{Path, PathBuf};
 
 use arm_sim::faults::FAULTS_HELP;
+use arm_sim::scene::Scene;
 use clap::{Args, Subcommand, ValueEnum};
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -18,7 +20,7 @@ use socket::SimulatorConnection;
 pub(crate) use socket::running_ports;
 use values::{factor, grams, hand, millis};
 
-/// Control a running simulator: faults, obstacles, a hand, a weight, power, virtual time.
+/// Control a running simulator: faults, obstacles, things on the table, a hand, a weight, power, virtual time.
 ///
 /// host-sim opens a control socket beside the arm's port. These commands use it, so that another program can drive the
 /// arm at the same time. All durations are virtual time.
@@ -36,6 +38,7 @@ Examples:
                                    holds it there
   sevenbot sim weight 150g         a weight in the gripper
   sevenbot sim fault 2=wall=60     a wall at 60 degrees, in the way of joint 2
+  sevenbot sim scene cubes.txt     things to grip and to stack
   sevenbot sim trip 2              the servo of joint 2 latches an overload
   sevenbot sim power cycle         off and on
   sevenbot sim speed 50x           virtual time; also max, pause, resume,
@@ -63,6 +66,7 @@ enum SimCommand {
     Weight(WeightArgs),
     /// Drop what is in the gripper: the thing between the claws, and the weight.
     Drop,
+    Scene(SceneArgs),
     Trip(TripArgs),
     /// Switch the power of the arm.
     Power {
@@ -141,6 +145,28 @@ struct WeightArgs {
     /// The weight in grams, as 150g or 150, up to 1000.
     #[arg(value_parser = grams)]
     weight: u16,
+}
+
+/// Put things on the table that can be gripped, pushed and stacked.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  sevenbot sim scene cubes.txt     in the file: cube red 30 40 0 200
+                                                cube blue 30 40 -80 190
+  sevenbot sim scene off           an arm without a table
+  sevenbot sim state               where everything is
+
+A line of a scene is one of these. Lengths are in mm, weights in grams, turns
+in degrees, in the frame of the arm: x to the right, y forward, z up.
+  table Z
+  tool claws                       or: tool cup, for the pump
+  wall NAME X Y WIDTH DEPTH HEIGHT
+  cube NAME EDGE GRAMS X Y [TURN]
+  cylinder NAME DIAMETER HEIGHT GRAMS X Y")]
+struct SceneArgs {
+    /// File with the scene, or 'off'.
+    #[arg(value_name = "FILE|off")]
+    file: PathBuf,
 }
 
 /// Force an alarm on a servo: it switches its motor off.
@@ -233,6 +259,7 @@ impl Printable for SimulatorAnswer<'_> {
             SimCommand::Fault(args) => text::faults(out, &args.action, &self.value),
             SimCommand::Hand(args) => text::hand(out, args.joint, &self.value),
             SimCommand::State => text::state(out, &self.value),
+            SimCommand::Scene(_) => text::objects(out, &self.value),
             SimCommand::Snapshot(_) | SimCommand::Restore(_) => text::snapshot(out, &self.value),
             SimCommand::Pause | SimCommand::Resume | SimCommand::Advance(_) | SimCommand::Speed(_) => {
                 text::time(out, &self.value)
@@ -264,6 +291,7 @@ fn request(command: &SimCommand) -> Result<Value, CommandError> {
         SimCommand::Hand(HandArgs { joint, to }) => json!({ "do": "hand", "joint": joint, "to": to }),
         SimCommand::Weight(WeightArgs { weight }) => json!({ "do": "weight", "grams": weight }),
         SimCommand::Drop => json!({ "do": "drop" }),
+        SimCommand::Scene(SceneArgs { file }) => json!({ "do": "scene", "scene": scene(file)? }),
         SimCommand::Trip(TripArgs { joint, alarm }) => {
             json!({ "do": "trip", "joint": joint, "alarm": alarm })
         }
@@ -278,6 +306,17 @@ fn request(command: &SimCommand) -> Result<Value, CommandError> {
         SimCommand::Restore(SnapshotArgs { name }) => json!({ "do": "restore", "name": name }),
         SimCommand::State => json!({ "do": "state" }),
     })
+}
+
+/// The text of a scene, if it is one.
+fn scene(file: &Path) -> Result<String, CommandError> {
+    if file == Path::new("off") {
+        return Ok("off".to_owned());
+    }
+    let refusal = |why: &dyn Display| CommandError::Usage(format!("{}: {why}", file.display()));
+    let text = std::fs::read_to_string(file).map_err(|why| refusal(&why))?;
+    let scene: Scene = text.parse().map_err(|why| refusal(&why))?;
+    Ok(scene.to_string())
 }
 
 fn fault_request(args: &FaultArgs) -> Result<Value, CommandError> {

@@ -75,6 +75,17 @@ fn speed(value: &Value) -> String {
     }
 }
 
+/// The things on the table, and in the gripper.
+pub(super) fn objects(out: &mut dyn Write, value: &Value) -> io::Result<()> {
+    for object in list(value, "objects") {
+        let place = list(object, "place_mm").iter().filter_map(Value::as_f64);
+        let place: String = place.map(|mm| format!("{mm:8.1}")).collect();
+        let carried = if object.get("is_carried") == Some(&Value::Bool(true)) { "   carried" } else { "" };
+        writeln!(out, "{:16}{place} mm{carried}", string(object, "name"))?;
+    }
+    Ok(())
+}
+
 /// The state of the arm.
 pub(super) fn state(out: &mut dyn Write, value: &Value) -> io::Result<()> {
     writeln!(out, "port        {}", string(value, "port"))?;
@@ -95,6 +106,10 @@ pub(super) fn state(out: &mut dyn Write, value: &Value) -> io::Result<()> {
             number(joint, "servo_position"),
             number(joint, "load_percent"),
         )?;
+    }
+    if !list(value, "objects").is_empty() {
+        writeln!(out)?;
+        objects(out, value)?;
     }
     if !list(value, "faults").is_empty() || !list(value, "ended_faults").is_empty() {
         writeln!(out)?;
