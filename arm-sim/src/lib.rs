@@ -52,6 +52,7 @@ pub mod simulated_arm;
 pub mod simulation;
 pub mod stock_controller;
 pub mod tap;
+mod thousandths;
 pub mod usb_adapter;
 pub mod world;
 

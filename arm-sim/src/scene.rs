@@ -18,6 +18,8 @@ use core::str::FromStr;
 
 use kinematics::geometry::BASE_HEIGHT;
 
+use crate::thousandths::Thousandths;
+
 /// A scene has at most this many walls, cubes and cylinders.
 pub const MOST_OBJECTS: usize = 24;
 /// A name has at most this many letters.
@@ -123,7 +125,7 @@ pub struct SceneError {
 
 const KINDS: &str = "use table Z, tool claws, tool cup, wall NAME X Y WIDTH DEPTH HEIGHT, cube NAME EDGE GRAMS X Y \
                      [TURN] or cylinder NAME DIAMETER HEIGHT GRAMS X Y";
-const NUMBER: &str = "a number is missing or is none";
+const NUMBER: &str = "a number is missing, or has more than three decimals";
 const PLACE: &str = "a place is at most 1000 mm from the base";
 const SIZE: &str = "a length is 5 to 1000 mm";
 const WEIGHT: &str = "a weight is 1 to 1000 g, in whole grams";
@@ -197,7 +199,16 @@ impl Scene {
 }
 
 fn number(word: &str) -> Result<f64, &'static str> {
-    word.parse().ok().filter(|value: &f64| value.is_finite()).ok_or(NUMBER)
+    Thousandths::parse(word).map(|Thousandths(value)| f64::from(value) / 1_000.0).ok_or(NUMBER)
+}
+
+/// A number of a scene in words.
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "numbers of a scene are small, and a part below a thousandth is none"
+)]
+const fn words(value: f64) -> Thousandths {
+    Thousandths((value * 1_000.0 + if value < 0.0 { -0.5 } else { 0.5 }) as i32)
 }
 
 fn within(value: f64, [low, high]: [f64; 2], reason: &'static str) -> Result<f64, &'static str> {
@@ -219,11 +230,12 @@ fn cube(edge: &str) -> Result<Form, &'static str> {
 impl Display for Scene {
     /// The scene on one line.
     fn fmt(&self, out: &mut Formatter<'_>) -> fmt::Result {
-        write!(out, "table {}", self.table)?;
+        write!(out, "table {}", words(self.table))?;
         if self.tool == Tool::Cup {
             out.write_str("; tool cup")?;
         }
-        for Block { name, at: [x, y], size: [width, depth, height] } in &self.walls {
+        for Block { name, at, size } in &self.walls {
+            let ([x, y], [width, depth, height]) = (at.map(words), size.map(words));
             write!(out, "; wall {name} {x} {y} {width} {depth} {height}")?;
         }
         self.items.iter().try_for_each(|item| write!(out, "; {item}"))
@@ -232,11 +244,12 @@ impl Display for Scene {
 
 impl Display for Item {
     fn fmt(&self, out: &mut Formatter<'_>) -> fmt::Result {
-        let Self { name, form, grams, at: [x, y], turn } = self;
-        match form {
-            Form::Cube { edge } => write!(out, "cube {name} {edge} {grams} {x} {y} {turn}"),
+        let Self { name, form, grams, at, turn } = self;
+        let ([x, y], turn) = (at.map(words), words(*turn));
+        match *form {
+            Form::Cube { edge } => write!(out, "cube {name} {} {grams} {x} {y} {turn}", words(edge)),
             Form::Cylinder { diameter, height } => {
-                write!(out, "cylinder {name} {diameter} {height} {grams} {x} {y}")
+                write!(out, "cylinder {name} {} {} {grams} {x} {y}", words(diameter), words(height))
             }
         }
     }
@@ -252,7 +265,7 @@ mod tests {
     fn a_scene_is_printed_as_it_is_read() {
         let text = "table -40.5; tool cup; wall shelf 0 250 200 20 80; cube red 30 40 0 220 15; \
                     cylinder can 40 60 100 -80 200";
-        let scene: Scene = text.parse().expect("a scene");
+        let scene: Scene = text.parse().unwrap();
         assert_eq!(scene.to_string(), text);
         let lines = text.replace("; ", "  # a comment\n\n");
         assert_eq!(lines.parse(), Ok(scene));
@@ -271,6 +284,7 @@ mod tests {
             ("wall w 0 0 10 10 4", SIZE),
             ("cube red 30 0 0 200", WEIGHT),
             ("cube red 30 1.5 0 200", WEIGHT),
+            ("table 1e2", NUMBER),
             ("cube a 30 40 0 200", NAME),
             ("cube with_underscore 30 40 0 200", NAME),
             ("cube red 30 40 0 200 270", "a turn is -180 to 180 degrees"),

@@ -9,6 +9,7 @@ use protocol_core::registers::Joint;
 
 use crate::fault_count::FaultCount;
 use crate::plant::{HIGHEST_STIFFNESS, Plant, STRONGEST_PUSH, Thing, Wall};
+use crate::thousandths::Thousandths;
 
 /// Something that a joint meets. It is counted in milliseconds: those in which the joint touched it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -101,18 +102,7 @@ fn surface(text: &str) -> Option<(i32, Option<u16>)> {
 
 /// Parses degrees with at most three decimals, 0 to 180.
 fn millidegrees(text: &str) -> Option<i32> {
-    let (whole, decimals) = text.split_once('.').unwrap_or((text, "0"));
-    let is_number =
-        |text: &str| (1..=3).contains(&text.len()) && text.bytes().all(|byte| byte.is_ascii_digit());
-    if !is_number(whole) || !is_number(decimals) {
-        return None;
-    }
-    let scale = match decimals.len() {
-        1 => 100,
-        2 => 10,
-        _ => 1,
-    };
-    let millidegrees = whole.parse::<i32>().ok()? * 1_000 + decimals.parse::<i32>().ok()? * scale;
+    let Thousandths(millidegrees) = Thousandths::parse(text)?;
     (0..=180_000).contains(&millidegrees).then_some(millidegrees)
 }
 
@@ -123,13 +113,7 @@ impl Display for Obstacle {
             Self::Wall(Wall { millidegrees, stiffness }) => ("wall", millidegrees, stiffness),
             Self::Thing(Thing { millidegrees, stiffness }) => ("thing", millidegrees, stiffness),
         };
-        write!(out, "{name}={}", millidegrees / 1_000)?;
-        match millidegrees % 1_000 {
-            0 => {}
-            part if part % 100 == 0 => write!(out, ".{}", part / 100)?,
-            part if part % 10 == 0 => write!(out, ".{:02}", part / 10)?,
-            part => write!(out, ".{part:03}")?,
-        }
+        write!(out, "{name}={}", Thousandths(*millidegrees))?;
         stiffness.map_or(Ok(()), |stiffness| write!(out, "/{stiffness}"))
     }
 }

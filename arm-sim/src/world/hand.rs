@@ -86,9 +86,12 @@ impl Hand {
             [FINGER_END, FINGER_BEND].map(|place| finger_point(place, self.claw));
         let finger_end = |aside| Ball { is_finger_end: true, ..ahead(end, aside) };
         let tool = match tool {
-            Tool::Claws => {
-                [finger_end(end_aside), finger_end(-end_aside), ahead(bend, bend_aside), ahead(bend, -bend_aside)]
-            }
+            Tool::Claws => [
+                finger_end(end_aside),
+                finger_end(-end_aside),
+                ahead(bend, bend_aside),
+                ahead(bend, -bend_aside),
+            ],
             Tool::Cup => [ahead(CUP - FINGER_RADIUS, 0.0); 4],
         };
         parts.into_iter().chain(edge).chain(tool)
@@ -175,7 +178,7 @@ mod tests {
         let gap = |claw| Hand::new([90.0, 90.0, 65.0, 90.0, 90.0, 90.0, claw]).grip().gap;
         assert!((2.0..4.0).contains(&gap(0.0)) && (74.0..78.0).contains(&gap(84.0)));
         for width in [10.0, 30.0, 60.0] {
-            let angle = angle_for(width).expect("within reach");
+            let angle = angle_for(width).unwrap();
             assert!((gap(angle) - width).abs() < 0.01, "{width}: {angle}");
         }
         assert_eq!([angle_for(1.0), angle_for(90.0)], [None; 2]);

@@ -256,9 +256,9 @@ impl World {
     /// The balls of the arm, and the corners of what it carries.
     fn balls(&self, hand: &Hand) -> Vec<Ball> {
         let carried = self.carried.and_then(|(index, _)| self.objects.get(index));
-        let corners = carried.into_iter().flat_map(|object| {
-            object.solid.corners(&object.frame).map(|point| Ball::new(point, 0.0, 6))
-        });
+        let corners = carried
+            .into_iter()
+            .flat_map(|object| object.solid.corners(&object.frame).map(|point| Ball::new(point, 0.0, 6)));
         hand.balls(self.scene.tool).chain(corners).collect()
     }
 
@@ -387,9 +387,11 @@ impl World {
     fn force(&self, ball: &Ball) -> Point {
         let under = self.scene.table - ball.point.z + ball.radius;
         let table = UP * (STIFFNESS * under.max(0.0));
-        let free = self.objects.iter().enumerate().filter(|(index, object)| {
-            !object.is_carried && !self.is_left_to_pads(*index, ball)
-        });
+        let free = self
+            .objects
+            .iter()
+            .enumerate()
+            .filter(|(index, object)| !object.is_carried && !self.is_left_to_pads(*index, ball));
         let solids = self.walls.iter().map(|(frame, solid)| (frame, *solid));
         let solids = solids.chain(free.map(|(_, object)| (&object.frame, object.solid)));
         let touches = solids.filter_map(|(frame, solid)| solid.touch(frame, ball.point, ball.radius));

@@ -5,8 +5,8 @@
 mod disturbances;
 mod gravity;
 mod obstacles;
-mod room;
 mod rig;
+mod room;
 mod servo_faults;
 mod simulated_arm;
 mod simulated_servos;

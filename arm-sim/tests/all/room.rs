@@ -4,6 +4,7 @@ use arm_sim::request::Request;
 use arm_sim::scene::Scene;
 use arm_sim::{Action, Duration, Joint, Simulation};
 use kinematics::{Vector, ik6};
+use motion_core::calibration::MicroDegrees;
 
 /// From the tip to the middle of the pads, with claws that hold 30 mm.
 const PADS: f64 = 59.5;
@@ -15,15 +16,16 @@ struct Room(Simulation);
 impl Room {
     fn new(scene: &str) -> Self {
         let mut arm = Simulation::default();
-        arm.plant_mut().set_scene(Some(scene.parse().expect("a scene")));
+        arm.plant_mut().set_scene(Some(scene.parse().unwrap()));
         arm.advance(Duration::from_millis(1_000));
         Self(arm)
     }
 
     /// Moves at 60 degrees per second to this point of the tip, with the tool straight down.
+    #[expect(clippy::cast_possible_truncation, reason = "angles of a pose")]
     fn tip_to(&mut self, x: f64, y: f64, z: f64) {
-        let angles = ik6(Vector::new(x, y, z), Vector::new(0.0, 0.0, -1.0)).expect("within reach");
-        let hundredths = angles.map(|degrees| (degrees * 100.0).round() as u16);
+        let angles = ik6(Vector::new(x, y, z), Vector::new(0.0, 0.0, -1.0)).unwrap();
+        let hundredths = angles.map(|degrees| MicroDegrees::nearest(degrees as f32).nearest_centidegree());
         let bytes: Vec<u8> = hundredths.iter().flat_map(|angle| angle.to_le_bytes()).collect();
         self.write(128, &bytes);
     }
@@ -54,8 +56,8 @@ impl Room {
 
     /// Where an object is.
     fn place(&self, name: &str) -> Vector<f64> {
-        let world = self.0.plant().world().expect("a scene");
-        world.objects().iter().find(|object| object.item.name == name).expect("the object").frame.origin
+        let world = self.0.plant().world().unwrap();
+        world.objects().iter().find(|object| object.item.name == name).unwrap().frame.origin
     }
 
     fn assert_at(&self, name: &str, [x, y, z]: [f64; 3], within: f64) {
@@ -180,7 +182,7 @@ fn the_same_calls_move_the_same_things_to_the_bit() {
         ["a", "b", "c"].map(|name| room.place(name))
     };
     assert_eq!(run(), run());
-    let scene: Scene = "cube a 30 40 -60 200 20".parse().expect("a scene");
+    let scene: Scene = "cube a 30 40 -60 200 20".parse().unwrap();
     let mut one = Room::new(&scene.to_string());
     let mut copy = Room(one.0.clone());
     one.pick(-60.0, 200.0, -45.0);
