@@ -138,6 +138,8 @@ fn shape(line: &str) -> String {
 #[test]
 fn each_command_prints_what_the_page_shows() {
     let mut terminals = Terminals { folder: tempfile::tempdir().expect("a folder"), simulator: None };
+    let scene = PAGE.split("```scene\n").nth(1).and_then(|rest| rest.split("```").next()).expect("a scene");
+    fs::write(terminals.folder.path().join("cubes.txt"), scene).expect("a file");
     let commands = commands();
     assert!(commands.len() > 10, "{commands:?}");
     for (command, shown) in commands {
