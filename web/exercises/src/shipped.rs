@@ -7,10 +7,10 @@ const FILES: [&str; 8] = [
     include_str!("../shipped/five-points.json"),
     include_str!("../shipped/square.json"),
     include_str!("../shipped/stairs.json"),
+    include_str!("../shipped/blocked.json"),
     include_str!("../shipped/pick-and-place.json"),
     include_str!("../shipped/sort.json"),
     include_str!("../shipped/stack.json"),
-    include_str!("../shipped/blocked.json"),
 ];
 
 /// The exercises that ship, the easiest first.

@@ -73,7 +73,7 @@ impl App {
                 self.act("fault", "7=thing=30");
             }
             "drop" => self.act_on_simulation("drop"),
-            "scene" => self.act_on_simulation(&format!("scene {}", self.dom.choice("scene"))),
+            "scene" => self.act_on_simulation(&format!("scene {}", self.dom.choice("room"))),
             "fault" => self.act_on_simulation(&format!("fault {value}")),
             "repair" => self.repair(),
             "power" => self.act_on_simulation("power-cycle"),

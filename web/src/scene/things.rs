@@ -7,6 +7,7 @@ use kinematics::Vector;
 
 use super::lines::LineEnd;
 use super::theme::{Palette, Rgb};
+use super::view::Thing;
 
 /// Corners of the edge of a cylinder.
 const SIDES: u16 = 24;
@@ -21,21 +22,6 @@ const NAMED: [(&str, Rgb); 6] = [
 ];
 /// The direction to the light.
 const LIGHT: Vec3 = Vec3::new(0.25, -0.45, 0.85);
-
-/// A thing, as it is drawn.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Thing {
-    /// Its middle, in mm.
-    pub middle: Vec3,
-    /// Its axes, each as long as half of its size.
-    pub axes: [Vec3; 3],
-    /// It is a cylinder along its third axis.
-    pub is_round: bool,
-    /// The colour that its name says.
-    pub named: Option<Rgb>,
-    /// It never moves.
-    pub is_wall: bool,
-}
 
 /// The walls and things of a room.
 #[must_use]

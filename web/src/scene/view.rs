@@ -4,7 +4,21 @@ use glam::Vec3;
 
 use super::arm::{Angles, Part};
 use super::theme::{Rgb, Theme};
-use super::things::Thing;
+
+/// A thing, as it is drawn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Thing {
+    /// Its middle, in mm.
+    pub middle: Vec3,
+    /// Its axes, each as long as half of its size.
+    pub axes: [Vec3; 3],
+    /// It is a cylinder along its third axis.
+    pub is_round: bool,
+    /// The colour that its name says.
+    pub named: Option<Rgb>,
+    /// It never moves.
+    pub is_wall: bool,
+}
 
 /// What the scene shows. Two equal views have the same picture.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,6 +1,7 @@
 //! Exercises: what the arm does is compared with their goals.
 
 use browser_tests::{Page, Viewed};
+use system_tests::wait::wait_until;
 
 /// The page with the exercise of this number begun.
 fn begun(viewed: &Viewed, number: &str) -> Page {
@@ -75,4 +76,48 @@ fn hints_a_solution_and_an_exercise_of_a_file_are_shown() {
     page.wait_for_text("#exercise-text", "Turn <it>.");
     page.click("[data-action=begin-exercise]");
     page.wait_for_text("#exercise-state", "Solved!");
+}
+
+/// Is something red drawn at this point of the room?
+fn is_red_at(page: &mut Page, place: [f64; 3]) -> bool {
+    page.centre("#scene");
+    let [x, y] = page.project(place);
+    let picture = page.picture();
+    let is_red = |[red, green, blue]: [u8; 3]| red > 120 && green < 90 && blue < 90;
+    let near = |at: f64| (-8..=8).map(move |step| (at + f64::from(step)) as usize);
+    let points = near(y).flat_map(|y| near(x).map(move |x| (x, y)));
+    points.filter(|(x, y)| is_red(picture.at(*x, *y))).count() > 40
+}
+
+#[test]
+fn a_cube_is_picked_up_by_the_solution_and_put_where_it_should_be() {
+    let viewed = Viewed::without_arm();
+    let mut page = begun(&viewed, "5");
+    page.wait_for_text("#exercise-goals", "○ The cube stands at 90, 180");
+    page.pass(0.2);
+    assert!(is_red_at(&mut page, [0.0, 200.0, -45.0]), "the cube is drawn");
+    page.click("[data-action=solution]");
+    page.wait_for_text("#python", "arm.set(\"effector-type\", 1)");
+    page.click("[data-action=run]");
+    page.wait_for_text("#exercise-goals", "✓ The cube stands at 90, 180");
+    page.wait_for_text("#exercise-state", "Solved! It took");
+    assert!(!is_red_at(&mut page, [0.0, 200.0, -45.0]), "it is somewhere else");
+}
+
+#[test]
+fn a_scene_is_put_on_the_table_from_a_list_or_a_file() {
+    let viewed = Viewed::without_arm();
+    let mut page = viewed.open();
+    assert!(!is_red_at(&mut page, [0.0, 200.0, -45.0]));
+    page.click("[data-action=scene]");
+    page.pass(0.2);
+    assert!(is_red_at(&mut page, [0.0, 200.0, -45.0]));
+    let file = viewed.path("scene.txt");
+    std::fs::write(&file, "# two\ncube red 30 40 80 200\ncube blue 30\n").expect("a file");
+    page.choose_file("#open-scene", &file);
+    page.wait_for_text("#notice", "This file is no scene: line 3 of the scene: use table Z");
+    std::fs::write(&file, "# one\ncube red 30 40 80 200\n").expect("a file");
+    page.choose_file("#open-scene", &file);
+    wait_until("the file is read", || is_red_at(&mut page, [80.0, 200.0, -45.0]));
+    assert!(!is_red_at(&mut page, [0.0, 200.0, -45.0]));
 }
