@@ -109,6 +109,9 @@ impl ArmControl {
     fn measured(&mut self, now: Instant, joint: Joint, answer: &Answer, is_timely: bool) {
         let may_engage = is_timely && !self.bus.is_starting();
         let outcome = self.joints.measured(now, joint, answer, may_engage, &mut self.registers);
+        if !is_timely {
+            self.joints.doubt(joint);
+        }
         match outcome {
             Measured::Rejected => return,
             Measured::FellSilent => return self.show_servos(),

@@ -238,6 +238,11 @@ impl JointState {
         self.torque.doubt();
     }
 
+    /// Does the joint wait for torque while its servo answers?
+    pub(crate) fn waits_and_answers(&self) -> bool {
+        self.drive.is_waiting() && self.position.is_known() && !self.is_unanswered
+    }
+
     /// Is the joint sent goals? Not while it is doubtful whether its servo has restarted
     /// ([D29](protocol_core::decisions#d29)).
     pub(crate) fn takes_goals(&self) -> bool {

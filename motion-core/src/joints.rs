@@ -197,9 +197,17 @@ impl Joints {
         let Some(state) = self.joint_mut(joint) else { return false };
         let fell_silent = state.failed(now);
         let mut driven = self.joints.iter().filter(|state| state.drive.has_set_point()).peekable();
-        let are_all_silent = driven.peek().is_some() && driven.all(|state| state.is_unanswered);
+        let are_driven_silent = driven.peek().is_some() && driven.all(|state| state.is_unanswered);
+        // A servo that answers has supply, also if its joint only waits for torque.
+        let are_all_silent = are_driven_silent && !self.joints.iter().any(JointState::waits_and_answers);
         self.supply.unanswered(now, are_all_silent);
         fell_silent
+    }
+
+    /// The last answer of this servo was processed late: it may have restarted since ([D29](protocol_core::decisions#d29)).
+    pub(crate) fn doubt(&mut self, joint: Joint) {
+        let engaged = self.joint_mut(joint).filter(|state| state.drive.is_engaged());
+        engaged.into_iter().for_each(JointState::doubt_torque);
     }
 
     /// Doubts the torque of servos that were not heard for long, so that it is read before the next goal: after a late call,

@@ -155,3 +155,21 @@ fn d29_the_torque_of_a_joint_that_is_let_go_is_read_after_a_silence_too() {
     assert!(was_read, "a goal without a question about torque");
     assert!(rig.plant.has_torque(joint));
 }
+
+#[test]
+fn d29_a_servo_that_answers_without_torque_has_supply_however_long_the_others_are_silent() {
+    // It starts for 200 ms, and is asked ten times a second. In some of these moments it has answered, and does not hold yet.
+    for millis in 235..270 {
+        let mut rig = Rig::started();
+        for joint in Joint::ALL.into_iter().skip(1) {
+            rig.plant.set_fault(joint, Some(ServoFault::Garbled(1)));
+        }
+        rig.run_ms(500);
+        comes_back(&mut rig, FIRST, true);
+        rig.run_ms(millis);
+        rig.now_us += 1_500_000;
+        rig.run_ms(500);
+        assert!(rig.plant.has_torque(FIRST), "after {millis} ms");
+        assert_eq!((rig.get(29), rig.get(SUPPLY_LOST), rig.get(LET_GO)), (1, 0, 0));
+    }
+}
