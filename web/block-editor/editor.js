@@ -8,6 +8,19 @@ var blockEditor = (() => {
   let workspace = null;
   let shown = null;
 
+  // The colours of style.css where the user prefers dark ones. Blocks keep theirs.
+  const prefersDark = matchMedia("(prefers-color-scheme: dark)");
+  const dark = Blockly.Theme.defineTheme("arm-dark", {
+    base: Blockly.Themes.Classic,
+    componentStyles: {
+      workspaceBackgroundColour: "#1b212a", toolboxBackgroundColour: "#12161c", toolboxForegroundColour: "#e6ebf2",
+      flyoutBackgroundColour: "#262e39", flyoutForegroundColour: "#e6ebf2", flyoutOpacity: 1, scrollbarColour: "#a9b4c3",
+      insertionMarkerColour: "#ffffff", insertionMarkerOpacity: 0.4, cursorColour: "#4cc3d9",
+    },
+  });
+  const theme = () => (prefersDark.matches ? dark : Blockly.Themes.Classic);
+  prefersDark.addEventListener("change", () => workspace?.setTheme(theme()));
+
   Blockly.dialog.setPrompt(ask);
   // The page shows what happens in its own places.
   Blockly.dialog.setAlert((_, done) => done?.());
@@ -46,7 +59,7 @@ var blockEditor = (() => {
     const isNarrow = element.clientWidth < 560;
     workspace = Blockly.inject(element, {
       toolbox: blockTable.toolbox, media: "media/", sounds: false, trashcan: false, comments: false, horizontalLayout: isNarrow,
-      renderer: "zelos", zoom: { startScale: isNarrow ? 0.6 : 0.7, wheel: false, pinch: true },
+      renderer: "zelos", theme: theme(), zoom: { startScale: isNarrow ? 0.6 : 0.7, wheel: false, pinch: true },
       move: { scrollbars: true, drag: true, wheel: true },
     });
     adoptStyles();

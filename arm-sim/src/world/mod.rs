@@ -38,6 +38,8 @@ const STIFFNESS: f64 = 8.0;
 const STEP_S: f64 = 0.001;
 /// In mm per second squared.
 const GRAVITY: f64 = 9_807.0;
+/// What is left of a sum and a difference, in mm.
+const ROUNDING: f64 = 1e-6;
 /// Two surfaces this near to each other touch, in mm.
 const NEAR: f64 = 0.5;
 /// Claws that are narrower than an object by more than this do not hold it, in mm.
@@ -46,8 +48,6 @@ const PLAY: f64 = 4.0;
 const SUCTION: f64 = 3.0;
 /// Objects that push each other: no longer row moves.
 const LONGEST_ROW: u32 = 4;
-/// Nothing falls below this, in mm below the table.
-const FLOOR: f64 = 700.0;
 
 /// An object in the room.
 #[derive(Clone, Debug)]
@@ -136,7 +136,7 @@ impl World {
     fn place(&mut self, item: Item) {
         let solid = Solid::from(item.form);
         let [x, y] = item.at;
-        let top = self.support(None, Vector::new(x, y, f64::MAX), f64::MAX);
+        let top = self.support(None, Vector::new(x, y, f64::MAX));
         let frame = Frame::upright(Vector::new(x, y, top + solid.half_height()), item.turn);
         self.objects.push(Object { item, frame, is_carried: false, solid, speed: 0.0 });
     }
@@ -266,34 +266,30 @@ impl World {
     fn fall(&mut self) {
         for index in 0..self.objects.len() {
             let Some(object) = self.objects.get(index).filter(|object| !object.is_carried) else { continue };
-            let bottom = object.bottom();
-            let support = self.support(Some(index), object.frame.origin, bottom);
+            let (bottom, middle) = (object.bottom(), object.frame.origin);
+            let support = self.support(Some(index), middle);
             let Some(object) = self.objects.get_mut(index) else { continue };
-            if bottom <= support {
-                object.speed = 0.0;
-                continue;
-            }
-            object.speed += GRAVITY * STEP_S;
+            let is_falling = bottom > support + ROUNDING;
+            object.speed = if is_falling { object.speed + GRAVITY * STEP_S } else { 0.0 };
+            // What was pressed down when it was let go comes up again.
             let next = (bottom - object.speed * STEP_S).max(support);
             object.frame.origin.z = next + object.solid.half_height();
-            self.is_moving = true;
+            self.is_moving |= is_falling;
         }
     }
 
-    /// The top of what is below a point, for the object with this index whose bottom is at this height.
-    fn support(&self, index: Option<usize>, point: Point, bottom: f64) -> f64 {
-        let is_below = |top: f64| top <= bottom + NEAR;
+    /// The top of what is below this point, the middle of the object with this index: at least the table.
+    fn support(&self, index: Option<usize>, middle: Point) -> f64 {
         let walls = self.walls.iter().filter_map(|(frame, solid)| {
-            let at = Vector::new(point.x, point.y, frame.origin.z);
+            let at = Vector::new(middle.x, middle.y, frame.origin.z);
             solid.touch(frame, at, 0.0).map(|_| frame.origin.z + solid.half_height())
         });
         let others =
             self.objects.iter().enumerate().filter(|(other, object)| {
-                Some(*other) != index && !object.is_carried && object.covers(point)
+                Some(*other) != index && !object.is_carried && object.covers(middle)
             });
         let tops = walls.chain(others.map(|(_, object)| object.top()));
-        let table = if is_below(self.scene.table) { self.scene.table } else { self.scene.table - FLOOR };
-        tops.filter(|top| is_below(*top)).fold(table, f64::max)
+        tops.filter(|top| *top <= middle.z).fold(self.scene.table, f64::max)
     }
 
     /// Objects move out of the way of a ball that touches their side.

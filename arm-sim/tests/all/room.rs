@@ -112,6 +112,15 @@ fn three_cubes_are_stacked() {
 }
 
 #[test]
+fn what_is_pressed_on_the_table_and_let_go_stands_on_it() {
+    let mut room = Room::new("cube red 30 40 0 200");
+    room.pick(0.0, 200.0, -45.0);
+    room.put(60.0, 190.0, -52.0);
+    room.assert_at("red", [60.0, 190.0, -45.0], 12.0);
+    assert!((room.place("red").z + 45.0).abs() < 0.01, "{:?}", room.place("red"));
+}
+
+#[test]
 fn what_is_dropped_falls_on_what_is_below_it() {
     let mut room = Room::new("wall shelf 0 200 80 80 50; cube red 30 40 0 200");
     room.assert_at("red", [0.0, 200.0, 5.0], 0.01);

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use browser_tests::page::PHONE;
+use browser_tests::page::{DARK, DESKTOP, PHONE};
 use browser_tests::{Page, Viewed};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
@@ -337,4 +337,20 @@ fn the_editor_speaks_chinese_and_fits_a_phone() {
     let width = page.number("document.documentElement.scrollWidth");
     assert!(width <= f64::from(PHONE.width), "the page is {width} wide");
     assert_eq!(page.errors(), [""; 0]);
+}
+
+#[test]
+fn the_editor_has_the_colours_that_the_user_prefers() {
+    let viewed = Viewed::without_arm();
+    let mut page = programs(&viewed);
+    for (screen, colour) in
+        [(DESKTOP, "rgb(255, 255, 255)"), (DARK, "rgb(27, 33, 42)"), (DESKTOP, "rgb(255, 255, 255)")]
+    {
+        page.show_on(screen);
+        wait_for("the editor has its colours", || {
+            let ground = "getComputedStyle(document.querySelector('#blocks .blocklyMainBackground')).fill";
+            let fill = page.evaluate(ground);
+            if fill == colour { Ok(()) } else { Err(format!("{fill} on {screen:?}")) }
+        });
+    }
 }
