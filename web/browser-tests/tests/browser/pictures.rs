@@ -40,6 +40,24 @@ fn write_the_pictures() {
 }
 
 #[test]
+#[ignore = "writes docs/web-room.png"]
+fn write_the_picture_of_a_room() {
+    let viewed = Viewed::without_arm();
+    let mut page = viewed.open();
+    page.click("[data-action=exercises]");
+    page.choose("#exercise-choice", "7");
+    page.click("[data-action=begin-exercise]");
+    page.click("[data-action=solution]");
+    page.wait_for_text("#python", "arm.line");
+    page.click("[data-action=run]");
+    page.wait_for_text("#exercise-goals", "✓ Blue stands on red");
+    // On the way with the third cube.
+    page.pass(11.0);
+    page.centre("#scene");
+    keep(&mut page, "web-room.png");
+}
+
+#[test]
 #[ignore = "writes docs/web.png"]
 fn write_the_animation() {
     let viewed = Viewed::without_arm();
