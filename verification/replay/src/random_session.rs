@@ -14,7 +14,7 @@ const ACTS: u32 = 40;
 /// The longest time between two of them, in microseconds.
 const LONGEST_PAUSE: u64 = 100_000;
 /// Actions without a random part.
-const ACTIONS: [&str; 11] = [
+const ACTIONS: [&str; 13] = [
     "clear",
     "restart",
     "power-cycle",
@@ -26,6 +26,9 @@ const ACTIONS: [&str; 11] = [
     "trip 5 heat",
     "seed 9",
     "halt",
+    // A table so high that the arm soon meets it.
+    "scene table 190; cube red 40 100 40 260; cylinder can 40 60 200 -40 250",
+    "scene off",
 ];
 /// Faults of a servo and what a joint meets, for a time.
 const JOINT_FAULTS: [&str; 8] =
