@@ -48,11 +48,11 @@ fn write_the_picture_of_a_room() {
     page.choose("#exercise-choice", "7");
     page.click("[data-action=begin-exercise]");
     page.click("[data-action=solution]");
-    page.wait_for_text("#python", "arm.line");
+    page.wait_for_text("#python", "straight=True");
     page.click("[data-action=run]");
     page.wait_for_text("#exercise-goals", "✓ Blue stands on red");
-    // On the way with the third cube.
-    page.pass(11.0);
+    page.wait_for_text("#exercise-state", "Solved!");
+    page.pass(2.0);
     page.centre("#scene");
     keep(&mut page, "web-room.png");
 }
