@@ -105,10 +105,7 @@ fn a_step_runs_one_block_and_the_next_one_is_lit() {
     open_text(&viewed, &mut page, program, "vacuum");
     for (lit, pump) in [("one", 0), ("two", 1)] {
         page.click("[data-action=step]");
-        wait_for("the block is lit", || {
-            let found = page.evaluate(LIT);
-            if found == lit { Ok(()) } else { Err(found.to_string()) }
-        });
+        wait_for_lit(&mut page, lit);
         page.wait_for_text("#program-state", "The program waits before the lit block.");
         assert_eq!(page.state()["registers"][31], pump);
     }
@@ -122,7 +119,14 @@ fn run_slowly(viewed: &Viewed, page: &mut Page) {
     open_text(viewed, page, SLOW, "speed=2");
     page.click("[data-action=run]");
     page.wait_for_state("joint 1 turns", |state| state["measured"][0].as_f64() > Some(91.0));
-    assert_eq!(page.evaluate(LIT), "turn");
+    wait_for_lit(page, "turn");
+}
+
+fn wait_for_lit(page: &mut Page, block: &str) {
+    wait_for("the block is lit", || {
+        let found = page.evaluate(LIT);
+        if found == block { Ok(()) } else { Err(found.to_string()) }
+    });
 }
 
 /// The arm stands.
@@ -348,9 +352,9 @@ fn the_editor_has_the_colours_that_the_user_prefers() {
     {
         page.show_on(screen);
         wait_for("the editor has its colours", || {
-            let ground = "getComputedStyle(document.querySelector('#blocks .blocklyMainBackground')).fill";
-            let fill = page.evaluate(ground);
-            if fill == colour { Ok(()) } else { Err(format!("{fill} on {screen:?}")) }
+            let ground = "getComputedStyle(document.querySelector('#blocks .blocklySvg')).backgroundColor";
+            let found = page.evaluate(ground);
+            if found == colour { Ok(()) } else { Err(format!("{found} on {screen:?}")) }
         });
     }
 }
