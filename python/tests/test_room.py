@@ -13,6 +13,7 @@ def test_a_cube_is_gripped_and_dropped(simulated_arm: sevenbot.Arm) -> None:
     assert world.scene is None and world.things == {}
     world.scene = "cube red 30 40 0 200"
     assert world.things == {"red": [0.0, 200.0, -45.0]}
+    simulated_arm.set("effector-type", 1)
     for height, claw in [(75, 60), (15, 60), (15, 10), (75, 10)]:
         simulated_arm.move_to(0, 200, height, straight=True)
         simulated_arm.set("target-position.7", claw)
