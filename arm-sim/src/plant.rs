@@ -248,13 +248,18 @@ impl Plant {
         &mut self.servos
     }
 
-    /// Loads each servo with its share of the arm's weight and inertia in this pose.
-    fn update_weight(&mut self) {
+    /// The true angles of the joints, in thousandths of a degree.
+    fn angles(&self) -> [i64; JOINTS] {
         let mut angles = [0; JOINTS];
         for ((angle, servo), scale) in angles.iter_mut().zip(&self.servos).zip(self.scales) {
             *angle = scale.angle(servo.position());
         }
-        let pose = JointSines::of(angles);
+        angles
+    }
+
+    /// Loads each servo with its share of the arm's weight and inertia in this pose.
+    fn update_weight(&mut self) {
+        let pose = JointSines::of(self.angles());
         let torques = weight::torques(pose, self.load_g.into());
         let inertias = inertia::inertias(pose, self.load_g.into());
         let (arm, scales) = (torques.into_iter().zip(inertias), self.scales);

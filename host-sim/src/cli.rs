@@ -171,7 +171,7 @@ fn ids(text: &str) -> Result<Ids, &'static str> {
     ids.filter(|ids| ids.len() <= JOINTS).ok_or("use up to seven ids from 0 to 253, as 0,1,2")
 }
 
-/// Parses the name of one of the two published tables of register 40.
+/// Reads and parses the file of a scene.
 fn scene(path: &str) -> Result<Scene, String> {
     std::fs::read_to_string(path)
         .map_err(|why| why.to_string())?
@@ -179,6 +179,7 @@ fn scene(path: &str) -> Result<Scene, String> {
         .map_err(|why: SceneError| why.to_string())
 }
 
+/// Parses the name of one of the two published tables of register 40.
 fn torque_codes(word: &str) -> Result<TorqueCodes, &'static str> {
     match word {
         "older" => Ok(TorqueCodes::DampingOnFree),

@@ -2,9 +2,6 @@
 
 use alloc::boxed::Box;
 
-use protocol_core::registers::{JOINTS, Joint};
-
-use super::pose::AngleScale;
 use super::{Plant, Thing};
 use crate::scene::Scene;
 use crate::world::{ArmInWorld, Effect, World};
@@ -37,6 +34,9 @@ impl Plant {
 
     /// A step of the room, after a step of the joints.
     pub(super) fn follow_in_room(&mut self) {
+        if self.world.is_none() {
+            return;
+        }
         let arm = self.arm_in_room();
         let Some(world) = &mut self.world else { return };
         let effect = world.step(arm);
@@ -47,10 +47,7 @@ impl Plant {
     }
 
     fn arm_in_room(&self) -> ArmInWorld {
-        let mut angles = [0.0; JOINTS];
-        for (angle, joint) in angles.iter_mut().zip(Joint::ALL) {
-            *angle = f64::from(self.angle(joint)) / 1_000.0;
-        }
+        let angles = self.angles().map(|angle| f64::from(i32::try_from(angle).unwrap_or(0)) / 1_000.0);
         ArmInWorld { angles, is_gripping: self.is_thing_gripped, is_sucking: self.is_sucking }
     }
 
@@ -68,11 +65,11 @@ impl Plant {
 
     /// The torques of contacts on joints 1 to 6, in mN m towards greater angles.
     fn set_contacts(&mut self, torques: [f64; 6]) {
-        for (torque, joint) in torques.into_iter().zip(Joint::ALL) {
-            let torque = AngleScale::of(joint).torque_towards_counts(micronewton_metres(torque));
-            let servo = self.servo(joint);
-            if servo.is_some_and(|servo| servo.contact() != torque) {
-                self.servo_mut(joint).into_iter().for_each(|servo| servo.set_contact(torque));
+        for ((servo, scale), torque) in self.servos.iter_mut().zip(self.scales).zip(torques) {
+            let torque = scale.torque_towards_counts(micronewton_metres(torque));
+            if servo.contact() != torque {
+                servo.set_contact(torque);
+                self.rest_until = self.now;
             }
         }
     }
