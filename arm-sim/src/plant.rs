@@ -58,12 +58,14 @@ pub struct Plant {
     decoder: Decoder,
     wire: Wire,
     supply: Supply,
-    /// The weight in the gripper, in grams.
+    /// The weight that was put into the gripper, in grams.
     load_g: u16,
-    /// What is between the claws.
-    thing: Option<Thing>,
-    /// The claws have touched it.
+    /// The weight of what it carries of the room, in grams.
+    carried_g: u16,
+    /// The claws have touched what is between them.
     is_thing_gripped: bool,
+    /// The angle at which the claws touch what is between them, in thousandths of a degree, if that is of the room.
+    room_stop: Option<i32>,
     /// What stands on the table.
     world: Option<Box<World>>,
     /// The pump sucks.
@@ -101,8 +103,9 @@ impl Plant {
             wire: Wire::at_baud(DELIVERED_BAUD),
             supply: Supply::default(),
             load_g: 0,
-            thing: None,
+            carried_g: 0,
             is_thing_gripped: false,
+            room_stop: None,
             world: None,
             is_sucking: false,
             has_echo: false,
@@ -260,8 +263,8 @@ impl Plant {
     /// Loads each servo with its share of the arm's weight and inertia in this pose.
     fn update_weight(&mut self) {
         let pose = JointSines::of(self.angles());
-        let torques = weight::torques(pose, self.load_g.into());
-        let inertias = inertia::inertias(pose, self.load_g.into());
+        let load_g = self.load_grams().into();
+        let (torques, inertias) = (weight::torques(pose, load_g), inertia::inertias(pose, load_g));
         let (arm, scales) = (torques.into_iter().zip(inertias), self.scales);
         for ((servo, scale), (torque, inertia)) in self.servos_mut().iter_mut().zip(scales).zip(arm) {
             servo.set_arm(scale.torque_towards_counts(torque), inertia);

@@ -51,10 +51,10 @@ impl Plant {
         }
     }
 
-    /// The weight in the gripper, in grams.
+    /// The weight in the gripper, with that of what it carries of the room, in grams.
     #[must_use]
     pub const fn load_grams(&self) -> u16 {
-        self.load_g
+        self.load_g + self.carried_g
     }
 
     /// Interrupts the power of one servo at `now`: torque and goal are lost, and no hand holds the joint.

@@ -53,8 +53,7 @@ impl Plant {
     /// Puts a thing between the claws, or takes it away. Joint 7 cannot close any further than its angle. The weight of
     /// the thing is that of [`Plant::set_load`].
     pub fn set_thing(&mut self, thing: Option<Thing>) {
-        self.thing = thing;
-        self.is_thing_gripped = false;
+        (self.is_thing_gripped, self.room_stop) = (false, None);
         let obstacle = thing.map(|Thing { millidegrees, stiffness }| {
             let position = AngleScale::of(CLAW).position(millidegrees.into());
             obstacle(CLAW, Side::FewerCounts, position, stiffness)
@@ -62,8 +61,9 @@ impl Plant {
         self.servo_mut(CLAW).into_iter().for_each(|servo| servo.set_thing(obstacle));
     }
 
-    /// Drops what is in the gripper: the thing and the weight.
+    /// Drops what is in the gripper: the thing and the weight, and what it carries of the room.
     pub fn drop_thing(&mut self) {
+        self.world.iter_mut().for_each(|world| world.tear_off());
         self.set_thing(None);
         self.set_load(0);
     }
@@ -113,8 +113,8 @@ impl Plant {
 
     /// Is a thing between the claws?
     #[must_use]
-    pub const fn has_thing(&self) -> bool {
-        self.thing.is_some()
+    pub fn has_thing(&self) -> bool {
+        self.servo(CLAW).is_some_and(|servo| servo.thing().is_some())
     }
 
     /// Grips the thing when the claws touch it, and drops it when they open beyond it.

@@ -26,10 +26,8 @@ impl Plant {
     }
 
     fn leave_room(&mut self) {
-        if self.world.take().is_some() {
-            self.drop_thing();
-            self.set_contacts([0.0; 6]);
-        }
+        self.world = None;
+        self.apply(&Effect::default());
     }
 
     /// A step of the room, after a step of the joints.
@@ -48,18 +46,24 @@ impl Plant {
 
     fn arm_in_room(&self) -> ArmInWorld {
         let angles = self.angles().map(|angle| f64::from(i32::try_from(angle).unwrap_or(0)) / 1_000.0);
-        ArmInWorld { angles, is_gripping: self.is_thing_gripped, is_sucking: self.is_sucking }
+        let is_gripping = self.is_thing_gripped && self.room_stop.is_some();
+        ArmInWorld { angles, is_gripping, is_sucking: self.is_sucking }
     }
 
     fn apply(&mut self, &Effect { torques, claw_stop, load_g }: &Effect) {
         self.set_contacts(torques);
-        // Claws that hold something keep what they hold: its angle is that of the moment when they closed.
+        // Claws that hold something keep what they hold: its angle is that of the moment when they closed. What a person put
+        // between them stays there, too.
+        let is_held = self.is_thing_gripped && load_g != 0;
+        let is_of_a_person = self.has_thing() && self.room_stop.is_none();
         let stop = claw_stop.map(millidegrees);
-        if !self.is_thing_gripped && stop != self.thing.map(|thing| thing.millidegrees) {
+        if !is_held && !is_of_a_person && stop != self.room_stop {
             self.set_thing(stop.map(|millidegrees| Thing { millidegrees, stiffness: None }));
+            self.room_stop = stop;
         }
-        if load_g != self.load_g {
-            self.set_load(load_g);
+        if load_g != self.carried_g {
+            self.carried_g = load_g;
+            self.update_weight();
         }
     }
 

@@ -102,6 +102,8 @@ pub struct World {
     between: Option<usize>,
     /// The carried object, and where it is seen from the tip.
     carried: Option<(usize, Frame)>,
+    /// Something was torn off the cup. It sucks nothing before the pump was off.
+    is_torn_off: bool,
     is_moving: bool,
 }
 
@@ -117,8 +119,15 @@ impl World {
         };
         let walls = scene.walls.iter().map(wall).collect();
         let items = scene.items.clone();
-        let mut world =
-            Self { scene, walls, objects: Vec::new(), between: None, carried: None, is_moving: true };
+        let mut world = Self {
+            scene,
+            walls,
+            objects: Vec::new(),
+            between: None,
+            carried: None,
+            is_torn_off: false,
+            is_moving: true,
+        };
         items.into_iter().for_each(|item| world.place(item));
         world
     }
@@ -169,9 +178,10 @@ impl World {
     /// Takes, moves and drops what the arm carries.
     fn carry(&mut self, hand: &Hand, arm: ArmInWorld) {
         let tip = hand.tip();
+        self.is_torn_off &= arm.is_sucking;
         let is_holding = match self.scene.tool {
             Tool::Claws => arm.is_gripping,
-            Tool::Cup => arm.is_sucking,
+            Tool::Cup => arm.is_sucking && !self.is_torn_off,
         };
         if !is_holding {
             self.drop_carried();
@@ -190,6 +200,12 @@ impl World {
             (object.is_carried, object.speed) = (true, 0.0);
             object.frame = frame.carried_by(&tip);
         }
+    }
+
+    /// What the arm carries falls.
+    pub(crate) fn tear_off(&mut self) {
+        self.is_torn_off = self.carried.is_some();
+        self.drop_carried();
     }
 
     fn drop_carried(&mut self) {

@@ -183,6 +183,39 @@ fn the_cup_carries_while_the_pump_sucks() {
 }
 
 #[test]
+fn what_is_torn_off_the_cup_falls_and_stays_until_the_pump_was_off() {
+    let mut room = Room::new("tool cup; cylinder can 40 60 100 0 220");
+    room.tip_to(0.0, 220.0, 60.0);
+    room.tip_to(0.0, 220.0, 25.5);
+    room.write(31, &[1]);
+    assert_eq!(room.0.plant().load_grams(), 100);
+    room.0.act(Action::Drop);
+    room.0.advance(Duration::from_millis(500));
+    assert_eq!(room.0.plant().load_grams(), 0, "the pump runs, and it was torn off");
+    room.write(31, &[0]);
+    room.write(31, &[1]);
+    assert_eq!(room.0.plant().load_grams(), 100);
+}
+
+#[test]
+fn a_weight_and_a_thing_of_a_person_are_there_beside_the_room() {
+    let mut room = Room::new("cube red 30 40 0 200");
+    room.0.act(Action::Weight(150));
+    room.pick(0.0, 200.0, -45.0);
+    assert_eq!(room.0.plant().load_grams(), 190);
+    room.0.act(Action::Drop);
+    room.0.advance(Duration::from_millis(500));
+    assert_eq!(room.0.plant().load_grams(), 0, "all of it falls");
+    room.claws_to(80);
+    room.0.set_fault("7=thing=50".parse().unwrap(), None);
+    room.claws_to(20);
+    let claw = room.0.plant().angle(Joint::ALL[6]);
+    assert!((49_000..51_000).contains(&claw), "{claw}: the thing is between the claws");
+    room.0.plant_mut().set_scene(None);
+    assert!(room.0.plant().has_thing(), "it is not of the room");
+}
+
+#[test]
 fn the_same_calls_move_the_same_things_to_the_bit() {
     let run = || {
         let mut room = Room::new("cube a 30 40 -60 200 20; cube b 30 40 0 200; cylinder c 30 50 30 60 200");
