@@ -229,12 +229,11 @@ impl Simulation {
     #[getter]
     fn things(&self, py: Python<'_>) -> PyResult<BTreeMap<String, [f64; 3]>> {
         self.with(py, |arm| {
-            let objects = arm.plant().world().map_or(&[][..], |world| world.objects());
             let place = |object: &Object| {
                 let at = object.frame.origin;
                 (object.item.name.clone(), [at.x, at.y, at.z])
             };
-            objects.iter().map(place).collect()
+            arm.plant().objects().iter().map(place).collect()
         })
     }
 

@@ -4,7 +4,7 @@ use alloc::boxed::Box;
 
 use super::{Plant, Thing};
 use crate::scene::Scene;
-use crate::world::{ArmInWorld, Effect, World};
+use crate::world::{ArmInWorld, Effect, Object, World};
 
 impl Plant {
     /// Puts a scene on the table round the arm, or takes it away. What the arm carried is gone.
@@ -17,6 +17,12 @@ impl Plant {
     #[must_use]
     pub fn world(&self) -> Option<&World> {
         self.world.as_deref()
+    }
+
+    /// The things of the room, in the order of the scene; none without a scene.
+    #[must_use]
+    pub fn objects(&self) -> &[Object] {
+        self.world().map_or(&[], World::objects)
     }
 
     /// Lets the suction cup of a scene suck, or let go.

@@ -50,7 +50,6 @@ pub fn of<F: NorFlash + Clone, C: ArmController>(pty_arm: &mut PtyArm<F, Plant, 
 
 /// What stands on the table, and what the arm carries.
 pub(super) fn objects(plant: &Plant) -> Vec<Value> {
-    let objects = plant.world().map_or(&[][..], |world| world.objects());
     let of = |object: &Object| {
         let at = object.frame.origin;
         let tenths = |mm: f64| (mm * 10.0).round() / 10.0;
@@ -61,7 +60,7 @@ pub(super) fn objects(plant: &Plant) -> Vec<Value> {
             "is_carried": object.is_carried,
         })
     };
-    objects.iter().map(of).collect()
+    plant.objects().iter().map(of).collect()
 }
 
 fn joint(plant: &Plant, joint: Joint) -> Value {
