@@ -24,7 +24,7 @@ fn a_file_that_cannot_be_written_is_refused_before_anything_moves() {
         };
         let play = ["play", text(&recording), "--plot"];
         arm.write(VACUUM_PUMP, &[0]);
-        refused(arm, &[&play[..], &["/nonexistent/wave.svg"]].concat(), "/nonexistent/wave.svg");
+        refused(arm, &[&play[..], &["/dev/null/wave.svg"]].concat(), "/dev/null/wave.svg");
         refused(arm, &[&play[..], &[text(&drawing)]].concat(), "the file exists; --force replaces it");
         refused(arm, &[&play[..], &[text(&recording), "--force"]].concat(), "the file that is read");
         let plot = ["plot", text(&recording), "--out"];

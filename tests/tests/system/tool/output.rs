@@ -35,6 +35,6 @@ pub(crate) fn words<'a>(text: &'a str, first: &str) -> Vec<&'a str> {
 /// Runs the tool without a port, and without the simulators of other tests.
 pub(crate) fn run_without_arm(arguments: &[&str]) -> Output {
     let mut tool = tool();
-    tool.args(arguments).env_remove("SEVENBOT_PORT").env("XDG_RUNTIME_DIR", "/nonexistent");
+    tool.args(arguments).env_remove("SEVENBOT_PORT").env("XDG_RUNTIME_DIR", "/dev/null");
     tool.output().expect("sevenbot runs")
 }

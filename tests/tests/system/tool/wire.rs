@@ -67,7 +67,7 @@ a damaged frame or a part of one, 4 bytes: AA 77 03 00
     );
     assert!(failed(&run_without_arm(&["sniff", "no-such-file"]), 1).contains("no-such-file"));
     assert!(failed(&run_without_arm(&["sniff"]), 2).contains("--port"));
-    let ignored = ["--log", "/nonexistent/log", "--port", "/dev/null", "servo", "scan"];
+    let ignored = ["--log", "/dev/null/log", "--port", "/dev/null", "servo", "scan"];
     assert!(failed(&run_without_arm(&ignored), 2).contains("opens no arm itself"));
 }
 
