@@ -77,8 +77,8 @@ impl Drive {
             Engagement::TorquePending { was_silent: true, has_new_target } => {
                 Engagement::Silent { has_new_target }
             }
-            Engagement::TorquePending { .. } => {
-                Engagement::Waiting { has_target: self.trajectory.is_moving() }
+            Engagement::TorquePending { has_new_target, .. } => {
+                Engagement::Waiting { has_target: has_new_target || self.trajectory.is_moving() }
             }
             other => other,
         };
@@ -145,9 +145,13 @@ impl Drive {
     /// host that came before is forgotten.
     pub fn lose_torque(&mut self, keeps_target: bool) {
         self.engagement = match self.engagement {
-            Engagement::Engaged | Engagement::TorquePending { .. } => {
+            Engagement::Engaged => {
                 Engagement::Waiting { has_target: keeps_target && self.trajectory.is_moving() }
             }
+            // The joint may be at a new target already, and move away from it before it has torque.
+            Engagement::TorquePending { has_new_target, .. } => Engagement::Waiting {
+                has_target: keeps_target && (has_new_target || self.trajectory.is_moving()),
+            },
             Engagement::Silent { has_new_target } => Engagement::Waiting { has_target: has_new_target },
             other => other,
         };

@@ -106,6 +106,23 @@ fn d12_a_joint_that_falls_silent_before_it_has_torque_engages_where_it_is_found(
 }
 
 #[test]
+fn d12_a_joint_that_leaves_its_target_before_it_has_torque_keeps_it() {
+    let lost: [fn(&mut Drive); 2] = [|drive| drive.lose_torque(true), Drive::mark_silent];
+    for lost in lost {
+        let mut drive = Drive::RELEASED;
+        drive.wait();
+        drive.set_target(degrees(40), 0);
+        drive.engage(degrees(40));
+        lost(&mut drive);
+        assert_eq!(drive.engage(degrees(41)), Some(Target::FromHost));
+        assert!(drive.is_moving());
+        drive.torque_is_on();
+        drive.advance(Instant::ZERO, 100);
+        assert_eq!(drive.set_point(), degrees(40));
+    }
+}
+
+#[test]
 fn d12_a_joint_that_falls_silent_again_before_its_torque_was_read_is_driven_on() {
     let mut drive = silent();
     drive.engage(degrees(43));
