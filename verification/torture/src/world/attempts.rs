@@ -4,6 +4,8 @@ use protocol_core::time::{Duration, Instant};
 
 /// A joint is given torque again at most [`MAX_ATTEMPTS`] times in this time.
 const WINDOW: Duration = Duration::from_millis(60_000);
+/// As [`WINDOW`], less the time from the decision of the controller to its order.
+const WINDOW_OF_ORDERS: Duration = Duration::from_millis(57_000);
 /// See [`WINDOW`].
 const MAX_ATTEMPTS: usize = 3;
 
@@ -12,6 +14,8 @@ const MAX_ATTEMPTS: usize = 3;
 pub(super) struct EngagementAttempts {
     /// The latest first.
     at: [Option<Instant>; MAX_ATTEMPTS],
+    /// Those before which the joint had certainly been let go, the latest first.
+    after_let_go: [Option<Instant>; MAX_ATTEMPTS],
     /// True once all of them were within the window.
     pub(super) is_exhausted: bool,
 }
@@ -22,5 +26,27 @@ impl EngagementAttempts {
         self.at.rotate_right(1);
         self.at.first_mut().into_iter().for_each(|first| *first = Some(now));
         self.is_exhausted |= self.at.iter().all(|at| at.is_some_and(|at| now - at < WINDOW));
+    }
+
+    /// The joint had certainly been let go, and is given torque. Returns whether that is once too often.
+    pub(super) fn add_after_let_go(&mut self, now: Instant) -> bool {
+        let [first, second, third] = self.after_let_go;
+        self.after_let_go = [Some(now), first, second];
+        third.is_some_and(|at| now - at < WINDOW_OF_ORDERS)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_fourth_attempt_in_a_minute_is_one_too_many() {
+        for (seconds, is_too_often) in [([0, 10, 20, 56], true), ([0, 10, 20, 58], false)] {
+            let mut attempts = EngagementAttempts::default();
+            let found =
+                seconds.map(|second| attempts.add_after_let_go(Instant::from_micros(second * 1_000_000)));
+            assert_eq!(found, [false, false, false, is_too_often]);
+        }
     }
 }

@@ -17,6 +17,10 @@ const SHORTEST: Duration = Duration::from_millis(50);
 const STOPS: [u64; 3] = [300, 3_000, 30_000];
 /// After an emergency stop, nothing else happens for this time.
 const AFTER_STOP: Duration = Duration::from_millis(3_000);
+/// So often a servo has an overload once more, and the time between two of them: a joint that fell is at rest, and engages, within
+/// it.
+const TRIPS: u8 = 5;
+const TRIP_PERIOD: Duration = Duration::from_millis(6_000);
 /// A wall is at most this far from the joint, in millidegrees.
 const FARTHEST_WALL: i32 = 40_000;
 /// The strongest push on joints 1 to 4 and on joints 5 to 7, in millinewton metres: below the stall torque of their
@@ -103,6 +107,7 @@ impl TortureWorld {
                 Ending::Wall(joint) => self.bus.set_wall(self.now, joint, None),
                 Ending::Push(joint) => self.bus.push(self.now, joint, 0),
                 Ending::Thing => self.bus.set_thing(self.now, None),
+                Ending::Trip(joint) => self.bus.trip(self.now, joint, Trip::Overload),
                 Ending::Stop => {
                     self.bus.end_stop(self.now);
                     self.supply_rule.stop_ends(self.now);
@@ -122,6 +127,19 @@ impl TortureWorld {
         let trip = if self.rng.one_in(2) { Trip::Overload } else { Trip::Heat };
         self.log.event(self.now, format!("servo {}: {trip:?}", joint.number()));
         self.bus.trip(self.now, joint, trip);
+        if self.rng.one_in(4) {
+            self.trip_again_and_again(joint);
+        }
+    }
+
+    /// Lets a servo have so many overloads that its joint may not engage any more (D28). The host orders nothing meanwhile.
+    fn trip_again_and_again(&mut self, joint: Joint) {
+        let mut at = self.now;
+        for _ in 0..TRIPS {
+            at = at + TRIP_PERIOD;
+            self.endings.push((at, Ending::Trip(joint)));
+        }
+        self.generator.only_read_until(at + TRIP_PERIOD);
     }
 
     /// Cuts the supply of the servos.

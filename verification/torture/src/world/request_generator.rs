@@ -89,6 +89,11 @@ impl RequestGenerator {
         self.next_at = self.next_at.max(now);
     }
 
+    /// The host only reads until then.
+    pub(super) fn only_read_until(&mut self, until: Instant) {
+        (self.only_reads, self.rate_until) = (true, until);
+    }
+
     /// The next transmissions. Sets `next_at` to the time of the next call.
     pub(super) fn next_transmissions(&mut self, now: Instant, rng: &mut SeededRng) -> Vec<Transmission> {
         if now >= self.rate_until {

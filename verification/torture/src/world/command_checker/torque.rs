@@ -77,6 +77,7 @@ impl CommandChecker {
         }
         self.check_servo_goal(joint, range.last_goal, context)?;
         self.check_alarm_is_over(joint, context)?;
+        self.check_attempts(joint, context)?;
         self.kept_goals[joint] = None;
         self.is_first[joint] = false;
         self.replies.forget_doubt(joint);
@@ -104,12 +105,28 @@ impl CommandChecker {
     /// A joint that let go engages when its alarm has been gone for a while (D28). If it let go soon after it had got torque, the
     /// controller may take its order for lost.
     fn check_alarm_is_over(&self, joint: Joint, context: &CommandContext<'_>) -> Check {
-        let truth = context.bus.truth(joint);
-        let times = truth.lost_at().zip(self.engaged_at[joint]);
-        let is_let_go = times.is_some_and(|(lost, engaged)| lost > engaged + HELD_FOR);
-        ensure(!is_let_go || !context.is_known(joint) || truth.is_calm(context.now), || {
+        let is_calm = context.bus.truth(joint).is_calm(context.now);
+        ensure(is_calm || !self.was_let_go(joint, context), || {
             format!("joint {} is given torque before its alarm is over", joint.number())
         })
+    }
+
+    /// A joint that was let go engages three times in a minute, and then only after register 29 was written (D28).
+    fn check_attempts(&mut self, joint: Joint, context: &CommandContext<'_>) -> Check {
+        // The servo of a joint that fell silent may have restarted unnoticed. Such a joint is not let go.
+        let was_silent = self.servo_lost_at[joint] > self.engaged_at[joint];
+        if was_silent || !self.was_let_go(joint, context) {
+            return Ok(());
+        }
+        ensure(!self.attempts[joint].add_after_let_go(context.now), || {
+            format!("joint {} was let go and is given torque for the fourth time in a minute", joint.number())
+        })
+    }
+
+    /// True if the joint was let go since it was last given torque, and the controller knows that.
+    fn was_let_go(&self, joint: Joint, context: &CommandContext<'_>) -> bool {
+        let times = context.bus.truth(joint).lost_at().zip(self.engaged_at[joint]);
+        times.is_some_and(|(lost, engaged)| lost > engaged + HELD_FOR) && context.is_known(joint)
     }
 
     /// The target of a joint that lost its torque since it was last given torque is where it gets torque again, unless the
