@@ -23,6 +23,7 @@ pub mod exercise;
 pub mod movement;
 pub mod park;
 pub mod plots;
+pub mod preview;
 mod problems_in_chinese;
 pub mod program;
 pub mod recorder;
@@ -32,4 +33,5 @@ pub mod stop;
 #[cfg(test)]
 mod tab;
 pub mod texts;
+pub mod time_line;
 pub mod words;

@@ -58,10 +58,11 @@ impl Language {
     #[must_use]
     pub fn problem(self, problem: Problem) -> String {
         if self == Self::English {
-            let (what, remedy) = (problem.to_string(), problem.kind.remedy());
-            let mut first = what.chars();
-            let capital = first.next().map(char::to_uppercase).into_iter().flatten();
-            return format!("{}{}. To do: {remedy}.", capital.collect::<String>(), first.as_str());
+            let (mut what, remedy) = (problem.to_string(), problem.kind.remedy());
+            if let Some(first) = what.get_mut(..1) {
+                first.make_ascii_uppercase();
+            }
+            return format!("{what}. To do: {remedy}.");
         }
         let (words, remedy) = words_and_remedy(problem.kind);
         let joint = problem.joint.map(|joint| format!("关节 {} ", joint.number())).unwrap_or_default();
@@ -353,6 +354,16 @@ const TEXTS: &[(&str, &str, &str)] = &[
     ),
     ("run", "Run", "运行"),
     ("step", "Step", "单步"),
+    ("preview", "Preview", "预演"),
+    ("preview-runs", "A simulated arm tries the program …", "正在用模拟机械臂预演程序……"),
+    (
+        "preview-too-long",
+        "The preview ends after five minutes. The program goes on.",
+        "预演只到五分钟为止，程序本身还会继续。",
+    ),
+    ("preview-failed", "In the preview the program ends early.", "预演中程序提前结束。"),
+    ("time-line", "Time line", "时间轴"),
+    ("look", "Look through", "逐帧查看"),
     ("add-pose", "Record this pose", "记录当前姿态"),
     ("save-program", "Save", "保存"),
     ("open-program", "Open…", "打开…"),

@@ -145,7 +145,17 @@ fn play_reason(language: Language, failure: &PlayFailure) -> String {
 /// Why a program of blocks ended early.
 #[must_use]
 pub fn program_failure(language: Language, failure: &ProgramFailure) -> String {
-    let reason = match failure {
+    format!("{} {}", language.text("program-failed"), program_reason(language, failure))
+}
+
+/// Why a program of blocks would end early, as its preview has found.
+#[must_use]
+pub fn preview_failure(language: Language, failure: &ProgramFailure) -> String {
+    format!("{} {}", language.text("preview-failed"), program_reason(language, failure))
+}
+
+fn program_reason(language: Language, failure: &ProgramFailure) -> String {
+    match failure {
         ProgramFailure::Program(error) => program_fault(language, &error.fault),
         ProgramFailure::Arm(failure) => play_reason(language, failure),
         ProgramFailure::Refused { details, .. } if language == Language::English => format!("{details}."),
@@ -156,8 +166,7 @@ pub fn program_failure(language: Language, failure: &ProgramFailure) -> String {
         ProgramFailure::OtherTargets(joints) => {
             format!("{} {}", language.text("other-targets"), numbers(joints.iter().copied()))
         }
-    };
-    format!("{} {reason}", language.text("program-failed"))
+    }
 }
 
 /// What is wrong with a program.

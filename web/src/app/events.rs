@@ -90,8 +90,10 @@ impl App {
             }
             "tour-end" => self.end_tour(),
             "close-notice" => self.dom.end_notice(),
-            _ if self.act_on_class(action) || self.act_on_program(action) || self.act_on_exercise(action) => {
-            }
+            _ if self.act_on_class(action)
+                || self.act_on_program(action)
+                || self.act_on_exercise(action)
+                || self.act_on_time_line(action) => {}
             _ => self.control(action, value),
         }
     }
@@ -213,6 +215,9 @@ impl App {
         // A number is sent when it is complete.
         if slider.type_() == "number" {
             return;
+        }
+        if slider.id() == "moment" {
+            return self.choose_moment();
         }
         let joint = slider.get_attribute("data-joint").and_then(|joint| joint.parse().ok());
         if let Some((joint, degrees)) = joint.zip(number(&slider)) {

@@ -35,6 +35,7 @@ mod program_state;
 mod programs;
 mod recording;
 mod storage;
+mod time_line;
 
 use std::cell::RefCell;
 use std::rc::Rc;

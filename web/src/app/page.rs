@@ -16,6 +16,7 @@ use super::exercise_list::Exercises;
 use super::kept_recording::KeptRecording;
 use super::program_state::Programs;
 use super::storage;
+use super::time_line::TimeLines;
 use crate::client::Client;
 use crate::movement::Player;
 use crate::park::Park;
@@ -85,6 +86,7 @@ pub(super) struct App {
     pub(super) recording: Option<KeptRecording>,
     pub(super) programs: Programs,
     pub(super) exercises: Exercises,
+    pub(super) time_lines: TimeLines,
     pub(super) tour_step: usize,
     /// `None` outside a class.
     pub(super) class: Option<ClassTab>,
@@ -191,6 +193,7 @@ impl App {
             recording: KeptRecording::of_storage(),
             programs: Programs::default(),
             exercises: Exercises::default(),
+            time_lines: TimeLines::default(),
             tour_step: 0,
             class: None,
             set_aside: None,
@@ -221,6 +224,7 @@ impl App {
                 break;
             }
         }
+        self.preview_on(until);
         self.class_on(time);
         self.show();
         self.frames = self.frames.wrapping_add(1);
@@ -306,6 +310,7 @@ impl App {
         (self.recorder, self.player, self.park) = (None, None, None);
         self.programs.run = None;
         self.exercises.end();
+        self.show_time_line(None);
         self.history = History::new(PLOT_SECONDS);
         let is_simulated = matches!(self.line, Line::Simulated(_));
         self.dom.set_hidden("simulator", !is_simulated);

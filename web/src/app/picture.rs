@@ -23,7 +23,10 @@ impl App {
         let (state, theme) = (self.client.state(), self.theme());
         let view = View {
             measured: state.angles(),
-            targets: (state.motor_state == motor_state::SERVO).then_some(state.targets),
+            targets: self
+                .time_lines
+                .angles()
+                .or((state.motor_state == motor_state::SERVO).then_some(state.targets)),
             colours: colours(&state, theme),
             unreachable: self.unreachable.map(|(tip, _)| tip),
             things: self.world().map(things).unwrap_or_default(),

@@ -120,6 +120,7 @@ impl App {
         storage::save(KEPT, &text);
         if text != self.programs.text {
             self.programs.ended = None;
+            self.end_preview();
             self.dom.set_hidden("link-row", true);
             Editor.warn(None, "");
         }
@@ -142,7 +143,7 @@ impl App {
         }
     }
 
-    fn show_program_error(&self, error: &ProgramError) {
+    pub(super) fn show_program_error(&self, error: &ProgramError) {
         let text = words::program_fault(self.language, &error.fault);
         Editor.warn(error.block.as_deref(), &text);
         self.dom.notice(&text);
@@ -159,6 +160,7 @@ impl App {
         match Program::parse(&self.programs.text) {
             Err(error) => self.show_program_error(&error),
             Ok(program) => {
+                self.show_time_line(None);
                 let before = self.registers_before_movement();
                 let now = self.now();
                 self.programs.run = Some(ProgramRun::new(&program, pace, &before, now));
@@ -200,8 +202,8 @@ impl App {
 
     /// Lights the block that runs, and says what the program does.
     pub(super) fn show_program(&mut self) {
-        let lit = self.programs.run.as_ref().and_then(ProgramRun::block).map(ToString::to_string);
-        let lit = lit.unwrap_or_default();
+        let running = self.programs.run.as_ref().and_then(ProgramRun::block).map(ToString::to_string);
+        let lit = running.or_else(|| self.time_lines.block()).unwrap_or_default();
         if lit != self.programs.lit {
             Editor.light(Some(lit.as_str()).filter(|lit| !lit.is_empty()));
             self.programs.lit = lit;

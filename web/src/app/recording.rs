@@ -46,6 +46,7 @@ impl App {
         let now = self.now();
         match Player::new(&recording.text, self.client.registers(), approach, now) {
             Ok(player) => {
+                self.show_time_line(None);
                 let before = self.end_program();
                 self.player = Some(match self.player.take() {
                     Some(earlier) => player.instead_of(&earlier, now, &mut self.client),
@@ -65,7 +66,7 @@ impl App {
         }
     }
 
-    fn say_that_nothing_is_recorded(&self) {
+    pub(super) fn say_that_nothing_is_recorded(&self) {
         self.dom.notice(self.language.text("record-first"));
     }
 

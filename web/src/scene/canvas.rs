@@ -182,7 +182,7 @@ fn context(canvas: &HtmlCanvasElement) -> Result<Option<Gl>, JsValue> {
 fn pixel_ratio(gl: &Gl) -> Result<f32, JsValue> {
     // A browser that hides the name of the graphics processor has no such extension, or an answer that names none of these.
     gl.get_extension("WEBGL_debug_renderer_info")?;
-    let name = gl.get_parameter(UNMASKED_RENDERER)?.as_string().unwrap_or_default().to_lowercase();
+    let name = gl.get_parameter(UNMASKED_RENDERER)?.as_string().unwrap_or_default().to_ascii_lowercase();
     let is_software =
         ["swiftshader", "llvmpipe", "software", "basic render"].iter().any(|known| name.contains(known));
     Ok(if is_software { 1.0 } else { SMOOTH_RATIO })

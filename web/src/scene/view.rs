@@ -25,7 +25,7 @@ pub struct Thing {
 pub struct View {
     /// Measured angles of joints 1 to 7, in degrees.
     pub measured: Angles,
-    /// Angles of the ghost: targets, or the nearest pose to a position out of reach. It is drawn where any joint differs
+    /// Angles of the ghost: targets, a moment of a time line, or the nearest pose to a position out of reach. It is drawn where any joint differs
     /// from the measured angle by more than a degree.
     pub targets: Option<Angles>,
     /// The colours of joints 1 to 7: see [`Palette::joint_ok`](super::theme::Palette::joint_ok) and its neighbours.

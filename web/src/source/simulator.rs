@@ -7,7 +7,8 @@ use super::{LineState, Source};
 /// A slice of virtual time. The line is polled after each.
 const SLICE: Duration = Duration::from_millis(10);
 
-/// A simulated arm.
+/// A simulated arm. A copy goes its own way.
+#[derive(Clone)]
 pub struct SimulatedSource {
     simulation: Simulation,
     /// Virtual time that has passed in the browser, but not in the simulation yet, in microseconds.

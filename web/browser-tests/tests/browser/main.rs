@@ -14,3 +14,4 @@ mod pixels;
 mod programs;
 mod recording;
 mod served_arm;
+mod time_line;

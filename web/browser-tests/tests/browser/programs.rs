@@ -10,7 +10,7 @@ use serde_json::json;
 use system_tests::wait::wait_for;
 
 /// The state of the last block that is lit.
-const LIT: &str = "document.querySelector('.blocklyHighlighted')?.dataset.id ?? ''";
+pub(crate) const LIT: &str = "document.querySelector('.blocklyHighlighted')?.dataset.id ?? ''";
 /// Joint 1 turns for a minute.
 pub(crate) const SLOW: &str = r#"{"blocks": {"blocks": [{"type": "arm_start", "id": "start", "next": {"block":
     {"type": "arm_move_joint", "id": "turn", "fields": {"JOINT": "1"}, "inputs": {
@@ -46,7 +46,7 @@ pub(crate) fn open_file(page: &mut Page, file: &Path, part: &str) {
     });
 }
 
-fn open_text(viewed: &Viewed, page: &mut Page, program: &str, part: &str) {
+pub(crate) fn open_text(viewed: &Viewed, page: &mut Page, program: &str, part: &str) {
     let file = viewed.path("program-to-open.json");
     std::fs::write(&file, program).expect("a file");
     open_file(page, &file, part);

@@ -1,0 +1,126 @@
+//! The time line below the picture: a recording, or the preview of a program, is looked through with a slider. The ghost in
+//! the picture shows the arm at that moment. Nothing moves.
+
+use std::time::Duration;
+
+use block_programs::Program;
+use sevenbot::recording::Recording;
+use web_sys::HtmlInputElement;
+
+use super::dom::{number, set_attribute};
+use super::page::{App, Line, browser_now};
+use crate::preview::{Preview, PreviewEnd};
+use crate::scene::Angles;
+use crate::time_line::{Stand, TimeLine};
+use crate::words;
+
+/// What the page has of time lines.
+#[derive(Default)]
+pub(super) struct TimeLines {
+    preview: Option<Preview>,
+    shown: Option<TimeLine>,
+    at: Duration,
+}
+
+impl TimeLines {
+    fn stand(&self) -> Option<Stand> {
+        self.shown.as_ref()?.at(self.at)
+    }
+
+    /// The angles of the ghost.
+    pub(super) fn angles(&self) -> Option<Angles> {
+        self.stand().map(|stand| stand.angles)
+    }
+
+    /// The block of the program at this moment.
+    pub(super) fn block(&self) -> Option<String> {
+        self.stand()?.block.map(|block| block.to_string())
+    }
+}
+
+impl App {
+    /// Does what a button asks for. Returns whether it is one of time lines.
+    pub(super) fn act_on_time_line(&mut self, action: &str) -> bool {
+        match action {
+            "preview" => self.begin_preview(),
+            "look" => self.look_through_recording(),
+            "close-time-line" => self.show_time_line(None),
+            _ => return false,
+        }
+        true
+    }
+
+    fn begin_preview(&mut self) {
+        if self.client.rounds() == 0 {
+            return self.dom.notice(self.language.text("connecting"));
+        }
+        match Program::parse(&self.programs.text) {
+            Err(error) => self.show_program_error(&error),
+            Ok(program) => {
+                self.show_time_line(None);
+                self.time_lines.preview = Some(match &self.line {
+                    Line::Simulated(arm) => Preview::on_copy_of(arm, &program),
+                    Line::Remote(_) => Preview::on_new_arm(self.client.registers(), &program),
+                });
+                self.dom.notice(self.language.text("preview-runs"));
+            }
+        }
+    }
+
+    /// The program is another one now.
+    pub(super) fn end_preview(&mut self) {
+        if self.time_lines.preview.is_some() || self.time_lines.block().is_some() {
+            self.show_time_line(None);
+        }
+    }
+
+    /// Goes on with a preview until the browser's clock shows this time.
+    pub(super) fn preview_on(&mut self, until: f64) {
+        let Some(mut preview) = self.time_lines.preview.take() else { return };
+        let Some(end) = preview.poll(|| browser_now() < until) else {
+            self.time_lines.preview = Some(preview);
+            return;
+        };
+        self.dom.end_notice();
+        match end {
+            PreviewEnd::Over => {}
+            PreviewEnd::TooLong => self.dom.notice(self.language.text("preview-too-long")),
+            PreviewEnd::Failed(failure) => self.dom.notice(&words::preview_failure(self.language, &failure)),
+        }
+        self.show_time_line(Some(preview.into_time_line()));
+    }
+
+    fn look_through_recording(&mut self) {
+        let Some(recording) = &self.recording else { return self.say_that_nothing_is_recorded() };
+        if let Ok(recording) = Recording::parse(&recording.text) {
+            self.show_time_line(Some(TimeLine::of(&recording)));
+        }
+    }
+
+    /// Shows the start of a movement, or none.
+    pub(super) fn show_time_line(&mut self, shown: Option<TimeLine>) {
+        self.dom.set_hidden("time-line", shown.is_none());
+        if let (Some(shown), Ok(slider)) = (&shown, self.dom.get::<HtmlInputElement>("moment")) {
+            set_attribute(&slider, "max", &format!("{:.2}", shown.length().as_secs_f64()));
+            slider.set_value("0");
+        }
+        self.time_lines = TimeLines { preview: None, shown, at: Duration::ZERO };
+        self.say_moment();
+    }
+
+    /// The slider was moved.
+    pub(super) fn choose_moment(&mut self) {
+        let seconds = self.dom.get::<HtmlInputElement>("moment").ok().as_ref().and_then(number);
+        self.time_lines.at = Duration::from_secs_f32(seconds.unwrap_or_default().max(0.0));
+        self.say_moment();
+    }
+
+    fn say_moment(&self) {
+        let Some((shown, stand)) = self.time_lines.shown.as_ref().zip(self.time_lines.stand()) else {
+            return;
+        };
+        let angles = stand.angles.map(|angle| format!("{angle:.0}°")).join(" ");
+        let (at, all) = (self.time_lines.at.as_secs_f64(), shown.length().as_secs_f64());
+        self.dom.set_text("moment-text", &format!("{at:.1} / {all:.1} s · {angles}"));
+    }
+}

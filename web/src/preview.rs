@@ -1,0 +1,201 @@
+//! Tries a program of blocks on a simulated arm of its own, as fast as the processor allows, and keeps its way as a
+//! [`TimeLine`]. The arm of the page is not touched.
+
+use block_programs::Program;
+use protocol_core::time::Instant;
+use sevenbot::Snapshot;
+use sevenbot::map::{SPEED, TIME};
+
+use crate::arm_state::{ArmState, target_frame};
+use crate::client::Client;
+use crate::program::{Pace, ProgramFailure, ProgramProgress, ProgramRun};
+use crate::source::Source;
+use crate::source::simulator::SimulatedSource;
+use crate::stop::since_start;
+use crate::time_line::{Stand, TimeLine};
+
+/// Program and simulated arm take turns after this virtual time, in microseconds.
+const STEP_MICROS: f64 = 20_000.0;
+/// The time line has ten moments a second.
+const STEPS_BETWEEN_STANDS: u32 = 5;
+/// After five minutes of a program its preview ends.
+const MOST_STEPS: u32 = 15_000;
+/// A new arm has engaged its joints after two seconds.
+const STEPS_TO_START: u32 = 100;
+/// It is in any pose after three more.
+const STEPS_TO_POSE: u32 = 150;
+
+/// How a preview has ended.
+#[derive(Clone, Debug, PartialEq)]
+pub enum PreviewEnd {
+    /// The program came to its end.
+    Over,
+    /// The program would end early, for this reason.
+    Failed(ProgramFailure),
+    /// The program goes on for more than five minutes.
+    TooLong,
+}
+
+/// A program that is tried.
+pub struct Preview {
+    client: Client,
+    arm: SimulatedSource,
+    run: ProgramRun,
+    begun: Instant,
+    steps: u32,
+    time_line: TimeLine,
+}
+
+impl Preview {
+    /// Tries a program on a copy of this simulated arm, with its room and its faults.
+    #[must_use]
+    pub fn on_copy_of(arm: &SimulatedSource, program: &Program) -> Self {
+        let (mut client, mut arm) = (Client::default(), arm.clone());
+        // What the arm has sent before is for the page.
+        drop(arm.receive());
+        pass(&mut client, &mut arm, STEPS_TO_START);
+        Self::begin(client, arm, program)
+    }
+
+    /// Tries a program on a new simulated arm in the pose and with the speeds of these registers. It has no things and no
+    /// obstacles.
+    #[must_use]
+    pub fn on_new_arm(registers: &Snapshot, program: &Program) -> Self {
+        let (mut client, mut arm) = (Client::default(), SimulatedSource::default());
+        pass(&mut client, &mut arm, STEPS_TO_START);
+        client.write(arm.now(), SPEED.address, &[0; 7]);
+        for (joint, angle) in (1..).zip(ArmState::new(registers).angles()) {
+            if let Some((address, values)) = target_frame(client.registers(), joint, angle) {
+                client.write(arm.now(), address, &values);
+            }
+        }
+        pass(&mut client, &mut arm, STEPS_TO_POSE);
+        for row in [SPEED, TIME] {
+            client.write(arm.now(), row.address, &registers.joints(&row));
+        }
+        pass(&mut client, &mut arm, STEPS_BETWEEN_STANDS);
+        Self::begin(client, arm, program)
+    }
+
+    fn begin(client: Client, arm: SimulatedSource, program: &Program) -> Self {
+        let begun = arm.now();
+        let run = ProgramRun::new(program, Pace::Running, client.registers(), begun);
+        Self { client, arm, run, begun, steps: 0, time_line: TimeLine::default() }
+    }
+
+    /// Goes on with the program while `has_time` says so. Returns how it ended, if it did.
+    pub fn poll(&mut self, mut has_time: impl FnMut() -> bool) -> Option<PreviewEnd> {
+        loop {
+            let end = match self.run.poll(self.arm.now(), &mut self.client) {
+                ProgramProgress::Running | ProgramProgress::Waiting if self.steps < MOST_STEPS => None,
+                ProgramProgress::Running | ProgramProgress::Waiting => Some(PreviewEnd::TooLong),
+                ProgramProgress::Over => Some(PreviewEnd::Over),
+                ProgramProgress::Failed(failure) => Some(PreviewEnd::Failed(failure)),
+            };
+            if end.is_some() || self.steps.is_multiple_of(STEPS_BETWEEN_STANDS) {
+                self.keep();
+            }
+            if end.is_some() {
+                return end;
+            }
+            pass(&mut self.client, &mut self.arm, 1);
+            self.steps += 1;
+            if !has_time() {
+                return None;
+            }
+        }
+    }
+
+    /// Where the arm has been so far.
+    #[must_use]
+    pub fn into_time_line(self) -> TimeLine {
+        self.time_line
+    }
+
+    fn keep(&mut self) {
+        self.time_line.push(Stand {
+            time: since_start(self.arm.now()).saturating_sub(since_start(self.begun)),
+            angles: self.client.state().angles(),
+            block: self.run.block().cloned(),
+        });
+    }
+}
+
+/// Lets virtual time pass.
+fn pass(client: &mut Client, arm: &mut SimulatedSource, steps: u32) {
+    for _ in 0..steps {
+        arm.send(&client.poll(arm.now()));
+        arm.advance(STEP_MICROS, || true);
+        let bytes = arm.receive();
+        client.receive(arm.now(), &bytes);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tab::Tab;
+
+    fn end_of(mut preview: Preview) -> (PreviewEnd, TimeLine) {
+        let mut turns = 0;
+        loop {
+            turns += 1;
+            let mut steps = 0;
+            let end = preview.poll(|| {
+                steps += 1;
+                steps < 100
+            });
+            if let Some(end) = end {
+                return (end, preview.into_time_line());
+            }
+            assert!(turns < 1_000, "it does not end");
+        }
+    }
+
+    fn example(name: &str) -> (String, Program) {
+        let path = format!("{}/block-programs/examples/{name}.json", env!("CARGO_MANIFEST_DIR"));
+        let workspace = std::fs::read_to_string(path).expect("an example");
+        let program = Program::parse(&workspace).expect("a program");
+        (workspace, program)
+    }
+
+    #[test]
+    fn a_preview_ends_where_the_program_ends_and_moves_nothing() {
+        for name in ["joints", "tip", "gripper", "functions"] {
+            let (workspace, program) = example(name);
+            let mut tab = Tab::new();
+            let before = tab.angles();
+            let on_copy = end_of(Preview::on_copy_of(&tab.arm, &program));
+            let on_new = end_of(Preview::on_new_arm(tab.client.registers(), &program));
+            assert_eq!(tab.angles(), before);
+            tab.run(&workspace, |_, _| ());
+            for (end, time_line) in [on_copy, on_new] {
+                assert_eq!(end, PreviewEnd::Over, "{name}");
+                let last = time_line.at(time_line.length()).expect("moments");
+                for (angle, there) in last.angles.iter().zip(tab.angles()) {
+                    assert!((f64::from(*angle) - there).abs() < 1.0, "{name}: {angle} and {there}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_preview_meets_the_obstacles_of_the_arm() {
+        let (_, program) = example("joints");
+        let mut tab = Tab::new();
+        tab.act("fault 1=stuck");
+        let (end, time_line) = end_of(Preview::on_copy_of(&tab.arm, &program));
+        assert!(matches!(end, PreviewEnd::Failed(_)), "{end:?}");
+        assert!(time_line.at(time_line.length()).expect("moments").block.is_some(), "the block is named");
+    }
+
+    #[test]
+    fn an_endless_program_has_a_preview_of_five_minutes() {
+        let endless = r#"{"blocks": {"blocks": [{"type": "arm_start", "id": "start", "next": {"block":
+            {"type": "controls_whileUntil", "id": "loop", "fields": {"MODE": "WHILE"},
+             "inputs": {"BOOL": {"block": {"type": "logic_boolean", "fields": {"BOOL": "TRUE"}}}}}}}]}}"#;
+        let program = Program::parse(endless).expect("a program");
+        let (end, time_line) = end_of(Preview::on_copy_of(&Tab::new().arm, &program));
+        assert_eq!((end, time_line.length().as_secs()), (PreviewEnd::TooLong, 300));
+    }
+}
