@@ -1,6 +1,7 @@
 //! What the registers say of an arm, in units.
 
-use kinematics::forward;
+use kinematics::geometry::{LINKAGE_MAX, LINKAGE_MIN};
+use kinematics::{forward, limits};
 use sevenbot::cartesian::{Breach, Guard, JointPath, Obstacle};
 use sevenbot::map::{
     EXTENDED_VERSION, FAULTS, FINE_POSITION, FINE_TARGET, LOAD, MISSING_SERVOS, MOTOR_STATE, MOVING_JOINTS,
@@ -11,6 +12,8 @@ use sevenbot::{FineAngle, Health, Joint, MoveTime, Problem, ProblemKind, Snapsho
 
 /// A joint is stalled at more than this distance from its target, in degrees. Under its load a servo that works is nearer.
 const STALLED_DISTANCE: f32 = 3.0;
+/// An arm at the end of its linkage is measured this far beyond it, in degrees.
+const LINKAGE_PLAY: f64 = 1.0;
 /// A joint below this velocity rests, in degrees per second.
 const RESTING_VELOCITY: f32 = 1.0;
 
@@ -150,10 +153,15 @@ pub fn breach_on_way(registers: &Snapshot, to: [f32; 7]) -> Option<Breach> {
     Guard::default().check_path(&path).err().map(|on_way| on_way.breach)
 }
 
-/// What of the arm is below the table or in its base at these angles.
+/// The name of the text that says where a part of the arm must not be at these angles, and is: below the table, in the base, or
+/// beyond the linkage.
 #[must_use]
-pub fn breach(angles: [f32; 7]) -> Option<Breach> {
-    Guard::default().check_pose(first_five(angles)).err()
+pub fn misplaced(angles: [f32; 7]) -> Option<&'static str> {
+    let [_, t2, t3, ..] = angles;
+    let is_within = (LINKAGE_MIN - LINKAGE_PLAY..=LINKAGE_MAX + LINKAGE_PLAY)
+        .contains(&limits::linkage(f64::from(t2), f64::from(t3)));
+    let breach = Guard::default().check_pose(first_five(angles)).err();
+    breach.map(|breach| breach_text(&breach)).or((!is_within).then_some("beyond-linkage"))
 }
 
 fn first_five(angles: [f32; 7]) -> [f64; 5] {

@@ -57,8 +57,8 @@ impl Preview {
         Self::begin(client, arm, program)
     }
 
-    /// Tries a program on a new simulated arm in the pose and with the speeds of these registers. It has no things and no
-    /// obstacles.
+    /// Tries a program on a new simulated arm in the pose and with the speeds of these registers. It stands on an
+    /// empty table.
     #[must_use]
     pub fn on_new_arm(registers: &Snapshot, program: &Program) -> Self {
         let (mut client, mut arm) = (Client::default(), SimulatedSource::default());

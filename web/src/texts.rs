@@ -227,6 +227,7 @@ const TEXTS: &[(&str, &str, &str)] = &[
     ("scene-cubes", "three cubes", "三个方块"),
     ("scene-shelf", "a shelf, a cube and a can", "一个架子、一个方块和一个罐子"),
     ("scene-cup", "two cans, and a suction cup", "两个罐子和一个吸盘"),
+    ("scene-table", "nothing", "什么都没有"),
     ("scene-off", "nothing, and no table", "什么都没有，也没有桌子"),
     ("scene-set", "Put it there", "放上去"),
     ("open-scene", "Open a scene…", "打开场景…"),
@@ -317,6 +318,7 @@ const TEXTS: &[(&str, &str, &str)] = &[
     ("unreachable", "out of reach", "无法到达"),
     ("below-table", "below the table", "低于桌面"),
     ("in-base", "in the space of the base", "进入底座区域"),
+    ("beyond-linkage", "beyond what the linkage of joints 2 and 3 allows", "超出关节 2 和 3 的连杆范围"),
     (
         "no-serial",
         "This browser cannot open USB ports. Chrome and Edge can; or run `sevenbot view` beside the arm.",
@@ -329,6 +331,17 @@ const TEXTS: &[(&str, &str, &str)] = &[
         "此地址没有机械臂，或地址已失效。请在机械臂旁运行 `sevenbot view`，并打开它显示的地址。",
     ),
     ("closed", "The connection ended:", "连接已断开："),
+    (
+        "server-ended",
+        "The connection ended: `sevenbot view` has ended, or the network is interrupted. Start it again, and open the address that it \
+         prints.",
+        "连接已断开：`sevenbot view` 已结束，或网络中断。请重新启动它，并打开它显示的地址。",
+    ),
+    (
+        "watch-only",
+        "This page only watches: its server was started with --read-only.",
+        "本页面只能观察：服务器以 --read-only 启动。",
+    ),
     ("bad-file", "This file is no recording:", "此文件不是动作录制："),
     ("play-failed", "The movement ended early.", "动作提前结束。"),
     ("record-failed", "The recording ended early.", "录制提前结束。"),

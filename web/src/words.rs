@@ -5,7 +5,7 @@ use sevenbot::health::MoveFault;
 use sevenbot::map::motor_state;
 use sevenbot::{Joint, ProblemKind};
 
-use crate::arm_state::{ArmState, breach, breach_text};
+use crate::arm_state::{ArmState, misplaced};
 use crate::movement::PlayFailure;
 use crate::program::ProgramFailure;
 use crate::stop::StopProgress;
@@ -100,10 +100,9 @@ fn moving_or_ready(
         return (language.text(name).to_owned(), Mood::Plain);
     }
     let name = if stop == StopProgress::Holds { "holds" } else { "ready" };
-    match breach(state.angles()) {
-        Some(breach) => {
-            let [line, part, place] =
-                [name, "a-part-is", breach_text(&breach)].map(|name| language.text(name));
+    match misplaced(state.angles()) {
+        Some(place) => {
+            let [line, part, place] = [name, "a-part-is", place].map(|name| language.text(name));
             (format!("{line} {part} {place}."), Mood::Bad)
         }
         None => (language.text(name).to_owned(), Mood::Good),
@@ -229,7 +228,9 @@ mod tests {
     /// An arm with these registers besides those of one that is well.
     fn with(registers: &[(u8, u8)]) -> ArmState {
         let mut all = sevenbot::Snapshot { address: 0, values: vec![0; 256] };
-        for &(address, value) in [(29, motor_state::SERVO), (199, 1), (240, 1)].iter().chain(registers) {
+        // Joints 2 and 3 in the middle of their linkage.
+        let well = [(29, motor_state::SERVO), (47, 115), (48, 65), (55, 115), (56, 65), (199, 1), (240, 1)];
+        for &(address, value) in well.iter().chain(registers) {
             all.values[usize::from(address)] = value;
         }
         ArmState::new(&all)
@@ -254,6 +255,11 @@ mod tests {
     fn the_most_important_thing_is_said() {
         assert_eq!(said(&state(), StopProgress::None), "The arm is ready.");
         assert_eq!(said(&state(), StopProgress::Holds), "Stopped: the arm holds.");
+        let folded = with(&[(47, 10), (55, 10)]);
+        assert!(
+            said(&folded, StopProgress::None).contains("beyond what the linkage"),
+            "65 - 65 + 10 is below 19"
+        );
         let moving = ArmState { moving: 1, ..state() };
         assert_eq!(said(&moving, StopProgress::Holds), "The arm is moving.", "it was moved again");
         let missing = with(&[(242, 0b101), (241, 1), (243, 1)]);

@@ -12,7 +12,7 @@ use crate::page::Page;
 /// A running server of the page.
 #[derive(Debug)]
 pub struct Viewed {
-    _server: RunningProgram,
+    server: Option<RunningProgram>,
     _simulator: Option<RunningProgram>,
     /// The address to open, with its token if there is an arm.
     pub url: String,
@@ -23,25 +23,36 @@ impl Viewed {
     /// Without an arm: the page simulates one.
     #[must_use]
     pub fn without_arm() -> Self {
-        Self::start(false)
+        Self::start(false, &[])
     }
 
     /// With an arm of `host-sim`.
     #[must_use]
     pub fn with_arm() -> Self {
-        Self::start(true)
+        Self::start(true, &[])
     }
 
-    fn start(has_arm: bool) -> Self {
+    /// With an arm of `host-sim` that the page cannot move.
+    #[must_use]
+    pub fn read_only() -> Self {
+        Self::start(true, &["--read-only"])
+    }
+
+    /// Ends the server.
+    pub fn end_server(&mut self) {
+        self.server = None;
+    }
+
+    fn start(has_arm: bool, options: &[&str]) -> Self {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let simulator = has_arm.then(|| simulator(&folder));
         let mut command = tool();
         command.current_dir(&folder);
         let arm: &[&str] = if has_arm { &["--port", "./arm"] } else { &["--simulate"] };
-        command.args(["view", "--no-open", "--http", "0"]).args(arm);
+        command.args(["view", "--no-open", "--http", "0"]).args(arm).args(options);
         let (server, addresses) = process::start(&mut command, 1).expect("the server is ready");
         let url = addresses.first().expect("an address").display().to_string();
-        Self { _server: server, _simulator: simulator, url, folder }
+        Self { server: Some(server), _simulator: simulator, url, folder }
     }
 
     /// Opens the page, ends its tour, and waits until an arm answers.

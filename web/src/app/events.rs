@@ -18,12 +18,10 @@ use crate::arm_state::target_frame;
 use crate::movement::{PlayProgress, Player};
 use crate::park::{Park, ParkProgress};
 use crate::plots::Quantity;
-use crate::source::serial::SerialSource;
-use crate::source::socket::SocketSource;
 use crate::words;
 
 /// The texts of the tour, in their order. The last one is for a real arm.
-const TOUR: [&str; 5] = ["tour-1", "tour-2", "tour-3", "tour-4", "tour-5"];
+pub(super) const TOUR: [&str; 5] = ["tour-1", "tour-2", "tour-3", "tour-4", "tour-5"];
 
 /// Listens to everything that a person can do.
 pub(super) fn listen(dom: &Dom) -> Result<(), JsValue> {
@@ -99,6 +97,9 @@ impl App {
     }
 
     pub(super) fn write(&mut self, address: u8, values: &[u8]) {
+        if self.only_watches() {
+            return;
+        }
         self.park = None;
         let now = self.now();
         // A target would be one point of the stream of a movement, and the next point would lead back.
@@ -172,6 +173,9 @@ impl App {
     }
 
     pub(super) fn stop(&mut self) {
+        if self.only_watches() {
+            return;
+        }
         let now = self.now();
         if self.stop_program(now) {
             return;
@@ -248,48 +252,6 @@ impl App {
             id if TIP_FIELDS.contains(&id) => self.type_tip(),
             id if id.starts_with("target-") => self.type_joint(&element),
             _ => self.change_register(&element),
-        }
-    }
-
-    /// Shows the arm behind the server if the opened address has its token, or else the simulated one.
-    pub(super) fn show_first_arm(&mut self) {
-        let query = web_sys::window().and_then(|window| window.location().search().ok());
-        if query.is_some_and(|query| query.contains("token=")) {
-            self.dom.choose("source", "server");
-            self.choose_source();
-            self.tour_step = TOUR.len() - 1;
-        }
-        if storage::load("tour").is_none() {
-            self.begin_tour();
-        }
-    }
-
-    fn choose_source(&mut self) {
-        let line = match self.dom.choice("source").as_str() {
-            "server" => self.server_arm().map(|source| Line::Remote(Box::new(source))).ok(),
-            "usb" => SerialSource::ask().map(|source| Line::Remote(Box::new(source))),
-            _ => Some(Line::Simulated(Box::default())),
-        };
-        match line {
-            Some(line) => self.set_line(line),
-            None if self.class.is_some() => {
-                self.dom.choose("source", "simulator");
-                self.set_line(Line::Simulated(Box::default()));
-                self.dom.notice(self.language.text("not-your-arm"));
-            }
-            None => {
-                self.dom.choose("source", "simulator");
-                self.set_line(Line::Simulated(Box::default()));
-                self.dom.notice(self.language.text("no-serial"));
-            }
-        }
-    }
-
-    /// The arm at the server: in a class the real one, while this tab has it.
-    fn server_arm(&self) -> Result<SocketSource, JsValue> {
-        match &self.class {
-            None => SocketSource::connect(),
-            Some(class) => SocketSource::connect_with(&class.arm_query().ok_or("another tab has it")?),
         }
     }
 

@@ -18,6 +18,7 @@
 mod class;
 mod class_socket;
 mod class_tab;
+mod connection;
 mod controls;
 mod dom;
 mod editor;

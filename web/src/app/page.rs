@@ -11,6 +11,7 @@ use wasm_bindgen::{JsCast, JsValue};
 use web_sys::{CanvasRenderingContext2d, Element, Event};
 
 use super::class_tab::ClassTab;
+use super::connection::Connection;
 use super::dom::Dom;
 use super::exercise_list::Exercises;
 use super::kept_recording::KeptRecording;
@@ -61,6 +62,7 @@ pub(super) struct App {
     pub(super) dom: Dom,
     pub(super) line: Line,
     pub(super) client: Client,
+    pub(super) connection: Connection,
     /// `None` where the browser has no WebGL2.
     pub(super) scene: Option<Scene>,
     pub(super) plot: CanvasRenderingContext2d,
@@ -174,6 +176,7 @@ impl App {
             dom,
             line: Line::Simulated(Box::default()),
             client: Client::default(),
+            connection: Connection::default(),
             scene: scene.ok(),
             plot,
             history: History::new(PLOT_SECONDS),
@@ -226,6 +229,7 @@ impl App {
         }
         self.preview_on(until);
         self.class_on(time);
+        self.tell_end_of_line();
         self.show();
         self.frames = self.frames.wrapping_add(1);
     }
@@ -307,6 +311,7 @@ impl App {
         let before = (std::mem::replace(&mut self.line, line.0), std::mem::replace(&mut self.client, line.1));
         (self.shown_round, self.slid_round) = (0, 0);
         (self.hand, self.unreachable) = (None, None);
+        self.connection.is_end_told = false;
         (self.recorder, self.player, self.park) = (None, None, None);
         self.programs.run = None;
         self.exercises.end();

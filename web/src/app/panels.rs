@@ -11,8 +11,7 @@ use web_sys::{Element, HtmlInputElement};
 
 use super::dom::{Dom, set_attribute, set_text};
 use super::page::{App, Line};
-use crate::arm_state::{ArmState, breach, breach_text, has_extended_block, tip};
-use crate::source::LineState;
+use crate::arm_state::{ArmState, has_extended_block, misplaced, tip};
 use crate::texts::Language;
 use crate::words::{Answers, state_line};
 
@@ -58,6 +57,7 @@ pub(super) fn build(dom: &Dom) -> Result<(), JsValue> {
 
 /// Shows the arm as it is now.
 pub(super) fn show(app: &mut App, state: &ArmState) {
+    app.show_watching();
     show_line(app, state);
     if app.client.rounds() == 0 {
         return show_nothing_known(&app.dom, app.language);
@@ -72,7 +72,7 @@ pub(super) fn show(app: &mut App, state: &ArmState) {
     show_speed_and_pump(app);
     let [x, y, z] = tip(state.angles());
     // Sliders go anywhere: this is the warning.
-    let at = breach(state.angles()).or(breach(state.targets)).map(|breach| breach_text(&breach));
+    let at = misplaced(state.angles()).or(misplaced(state.targets));
     let reach = app.unreachable.map(|(_, why)| why).or(at);
     let reach = reach.map_or(String::new(), |why| format!(" · {}", language.text(why)));
     dom.set_text("tip", &format!("{}: x {x:.0}, y {y:.0}, z {z:.0} mm{reach}", language.text("tip")));
@@ -137,13 +137,12 @@ fn show_line(app: &mut App, state: &ArmState) {
         _ => None,
     };
     let (line, mood) = state_line(app.language, answers, state, (app.client.stop_progress(), doing));
-    app.dom.set_text("state", &line);
+    let sharing = SharingState::of(app.client.registers());
+    let watching =
+        sharing.filter(|sharing| sharing.is_read_only).map_or("", |_| app.language.text("watch-only"));
+    app.dom.set_text("state", format!("{line} {watching}").trim_end());
     if let Some(element) = app.dom.element("state") {
         set_attribute(&element, "class", mood.class());
-    }
-    if let LineState::Closed(reason) = app.line_state() {
-        let text = if app.client.rounds() > 0 { "closed" } else { "no-server" };
-        app.dom.notice(&format!("{} {reason}", app.language.text(text)));
     }
 }
 

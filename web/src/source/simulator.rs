@@ -1,5 +1,6 @@
 //! The whole arm in this tab: controller, servos and gravity, in virtual time.
 
+use arm_sim::scene::Scene;
 use arm_sim::{Action, Duration, Instant, Simulation, SimulationConfig};
 
 use super::{LineState, Source};
@@ -16,9 +17,12 @@ pub struct SimulatedSource {
 }
 
 impl Default for SimulatedSource {
+    /// An arm on an empty table.
     fn default() -> Self {
         let config = SimulationConfig { is_paced: false, ..SimulationConfig::default() };
-        Self { simulation: Simulation::new(config), owed: 0.0 }
+        let mut simulation = Simulation::new(config);
+        simulation.act(Action::Scene(Some(Scene::default())));
+        Self { simulation, owed: 0.0 }
     }
 }
 

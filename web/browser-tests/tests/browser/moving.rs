@@ -172,11 +172,13 @@ fn a_hand_moves_a_limp_arm_and_it_falls_when_let_go() {
     let fallen = page.measured();
     assert!(fallen[2] > 100.0, "{fallen:?}");
     let from = on_the_upper_arm(&mut page);
-    page.drag_and_hold(from, [from[0] - 60.0, from[1]]);
+    // Away from the table.
+    let to = [from[0] + 60.0, from[1]];
+    page.drag_and_hold(from, to);
     page.pass(1.0);
     let held = page.measured();
     assert!((held[1] - fallen[1]).abs() > 5.0, "{fallen:?} {held:?}");
-    page.release([from[0] - 60.0, from[1]]);
+    page.release(to);
     page.focus("#scene");
     page.key(" ");
     page.wait_for_text("#state", "nothing to stop");

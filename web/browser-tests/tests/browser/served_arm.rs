@@ -94,3 +94,35 @@ fn a_page_without_a_token_moves_no_arm() {
         0
     );
 }
+
+#[test]
+fn a_page_that_may_only_watch_says_so_and_has_no_controls() {
+    let viewed = Viewed::read_only();
+    let mut page = Page::open(&viewed.url);
+    page.key("Escape");
+    let watches = "This page only watches: its server was started with --read-only.";
+    page.wait_for_text("#state", watches);
+    page.wait_for_state("the arm answers", |state| state["connected"] == true);
+    let live =
+        "[...document.querySelectorAll('#stop, #joints input, [data-action=home], [data-action=play]')]
+        .filter(control => !control.disabled).length";
+    assert_eq!(page.evaluate(live), 0);
+    page.key(" ");
+    page.wait_for_text("#notice", watches);
+    assert!(!page.text("#state").contains("Stopped"), "{}", page.text("#state"));
+    // The controls of the simulated arm are live.
+    page.choose("#source", "simulator");
+    page.wait_until_ready();
+    assert!(page.number(live) > 7.0);
+}
+
+#[test]
+fn a_server_that_ends_is_told_with_what_to_do_and_the_notice_can_be_closed() {
+    let mut viewed = Viewed::with_arm();
+    let mut page = viewed.open();
+    viewed.end_server();
+    page.wait_for_text("#notice", "The connection ended: `sevenbot view` has ended");
+    page.click("[data-action=close-notice]");
+    page.pass(0.5);
+    assert_eq!(page.text("#notice"), "");
+}
