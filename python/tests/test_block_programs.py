@@ -11,6 +11,7 @@ import runpy
 import signal
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -30,7 +31,10 @@ def end_of(program: Path) -> list[float]:
     return [float(word) for word in program.with_suffix(".end.txt").read_text().split()]
 
 
-@pytest.mark.parametrize("program", sorted(EXAMPLES.glob("*.py")), ids=lambda path: path.stem)
+each_program = pytest.mark.parametrize("program", sorted(EXAMPLES.glob("*.py")), ids=lambda path: path.stem)
+
+
+@each_program
 def test_a_program_ends_where_it_does_in_the_page(
     program: Path, simulated_arm: sevenbot.SimulatedArm, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -45,18 +49,40 @@ def test_there_are_examples() -> None:
     assert len(list(EXAMPLES.glob("*.py"))) >= 6
 
 
-@pytest.mark.skipif(PROGRAMS is None, reason="SEVENBOT_PROGRAMS names no folder with host-sim")
-def test_a_program_runs_unchanged_with_the_name_of_a_port(tmp_path: Path) -> None:
-    link = tmp_path / "arm"
-    words = [f"{PROGRAMS}/host-sim", "--quiet", "--control", "none", "--eeprom", "none", "--link", str(link)]
-    simulator = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
+@contextlib.contextmanager
+def started(words: list[str], link: Path) -> Iterator[Path]:
+    """An arm of one of the programs, at this link."""
+    process = subprocess.Popen([*words, "--link", str(link)], stdout=subprocess.PIPE, text=True)
     try:
-        assert simulator.stdout is not None
-        assert any(line.startswith("ready") for line in simulator.stdout)
-        program = EXAMPLES / "functions.py"
-        subprocess.run([sys.executable, program, link], check=True, timeout=ENOUGH)
-        with sevenbot.Arm(link) as arm:
-            assert list(arm.angles) == pytest.approx(end_of(program), abs=TOLERANCE)
+        assert process.stdout is not None
+        assert any(line.startswith("ready") for line in process.stdout)
+        yield link
     finally:
-        simulator.send_signal(signal.SIGTERM)
-        simulator.wait(timeout=ENOUGH)
+        process.send_signal(signal.SIGTERM)
+        process.wait(timeout=ENOUGH)
+
+
+def run_to_its_end(program: Path, link: Path) -> None:
+    """Runs a program unchanged, with the name of a port."""
+    subprocess.run([sys.executable, program, link], check=True, timeout=ENOUGH)
+    with sevenbot.Arm(link) as arm:
+        assert list(arm.angles) == pytest.approx(end_of(program), abs=TOLERANCE)
+
+
+needs_programs = pytest.mark.skipif(PROGRAMS is None, reason="SEVENBOT_PROGRAMS names no folder with programs")
+
+
+@needs_programs
+def test_a_program_runs_unchanged_with_the_name_of_a_port(tmp_path: Path) -> None:
+    words = [f"{PROGRAMS}/host-sim", "--quiet", "--control", "none", "--eeprom", "none"]
+    with started(words, tmp_path / "arm") as link:
+        run_to_its_end(EXAMPLES / "functions.py", link)
+
+
+@needs_programs
+@each_program
+def test_a_program_ends_on_the_image_for_the_arm_where_it_does_in_the_page(
+    program: Path, tmp_path: Path
+) -> None:
+    with started([f"{PROGRAMS}/xtask", "emulate", "--no-build"], tmp_path / "arm") as link:
+        run_to_its_end(program, link)

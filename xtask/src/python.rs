@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use crate::run::{TaskResult, root, run_command, target_directory};
+use crate::run::{TaskResult, build_image, root, run_command, target_directory};
 use crate::venv::{self, pip};
 
 /// The packages from PyPI, at versions that were tried. gymnasium, mujoco and numpy are optional for users, but have tests;
@@ -33,6 +33,8 @@ const VERSION: &str = "import sys; assert sys.version_info >= (3, 10); print('%d
 /// Builds the wheel, and tests it with all interpreters on PATH.
 pub(crate) fn check() -> TaskResult {
     let wheel = wheel()?;
+    // Programs of blocks run on it.
+    build_image()?;
     for (version, program) in &interpreters() {
         println!("Python {version}");
         test(&environment(version, program)?, &wheel)?;

@@ -5,6 +5,7 @@ use std::process::Command;
 
 use system_tests::process::{self, RunningProgram};
 use system_tests::programs::{host_sim, tool};
+use system_tests::wait::wait_for;
 use tempfile::TempDir;
 
 use crate::page::Page;
@@ -76,6 +77,37 @@ impl Viewed {
         let mut command = tool();
         command.current_dir(&self.folder);
         command
+    }
+
+    /// Begins a movement of joint 1, ends it by `sevenbot stop`, and waits until the page says so. On a busy machine the page may
+    /// pause for a second, which ends a movement, too: then it begins again.
+    ///
+    /// # Panics
+    /// The movement ends for another reason, or the page pauses each time.
+    pub fn stop_by_another_program(&self, page: &mut Page, begin: impl Fn(&mut Page)) {
+        for _ in 0..10 {
+            let start = page.measured()[0];
+            begin(page);
+            wait_for("joint 1 turns", || {
+                let (measured, notice) = (page.measured()[0], page.text("#notice"));
+                if measured > start + 1.0 || notice.contains("ended early") {
+                    Ok(())
+                } else {
+                    Err(format!("{measured} {notice}"))
+                }
+            });
+            let stop = self.tool().args(["stop", "--port", "./arm"]).output().expect("it runs");
+            assert!(stop.status.success(), "{stop:?}");
+            let notice = wait_for("the movement ends", || {
+                let notice = page.text("#notice");
+                if notice.contains("ended early") { Ok(notice) } else { Err(notice) }
+            });
+            if notice.contains("Another program has stopped the arm.") {
+                return;
+            }
+            assert!(notice.contains("did not run for a while"), "{notice}");
+        }
+        panic!("the page pauses each time");
     }
 
     /// The address without path and token.

@@ -67,13 +67,17 @@ fn a_recording_of_the_tool_is_played_and_another_file_is_refused() {
 
 /// Plays a movement that turns joint 1 for a minute, and waits until it turns.
 fn play_slowly(viewed: &Viewed, page: &mut Page) {
+    open_slow_movement(viewed, page);
+    page.click("[data-action=play]");
+    page.wait_for_state("joint 1 turns", |state| state["measured"][0].as_f64() > Some(92.0));
+}
+
+fn open_slow_movement(viewed: &Viewed, page: &mut Page) {
     let file = viewed.path("slow.7bot");
     let text = "7bot-recording 2\n0.000 90 90 65 90 90 90 80 0\n60.000 180 90 65 90 90 90 80 0\n";
     std::fs::write(&file, text).expect("a file");
     page.choose_file("#upload", &file);
     page.wait_for_text("#recording", "recorded: ");
-    page.click("[data-action=play]");
-    page.wait_for_state("joint 1 turns", |state| state["measured"][0].as_f64() > Some(92.0));
 }
 
 /// The movement is over, and the arm stands.
@@ -132,10 +136,10 @@ fn park_or_another_movement_ends_one_that_is_played_and_restores_its_speeds() {
 fn a_stop_of_another_program_ends_a_movement_that_is_played() {
     let viewed = Viewed::with_arm();
     let mut page = viewed.open();
-    play_slowly(&viewed, &mut page);
-    let stop = viewed.tool().args(["stop", "--port", "./arm"]).output().expect("it runs");
-    assert!(stop.status.success(), "{stop:?}");
-    page.wait_for_text("#notice", "Another program has stopped the arm.");
+    viewed.stop_by_another_program(&mut page, |page| {
+        open_slow_movement(&viewed, page);
+        page.click("[data-action=play]");
+    });
     check_it_stands(&mut page);
 }
 
