@@ -16,15 +16,6 @@ const DRIVING: &str = "#stop, [data-action=stop], #joints input, #tip-x, #tip-y,
      [data-action=motors], [data-action=home], [data-action=park], [data-action=grip], [data-action=pump], \
      [data-action=run], [data-action=step], [data-action=play], [data-register]";
 
-/// What the page knows of its connection.
-#[derive(Default)]
-pub(super) struct Connection {
-    /// A person knows that the connection has ended.
-    pub(super) is_end_told: bool,
-    /// The controls are switched off, because the server lets nobody write.
-    is_watching: bool,
-}
-
 impl App {
     /// Shows the arm behind the server if the opened address has its token, or else the simulated one.
     pub(super) fn show_first_arm(&mut self) {
@@ -71,7 +62,7 @@ impl App {
     /// Tells once that the connection has ended, and what to do. A new server has another token, so the page does not look for it.
     pub(super) fn tell_end_of_line(&mut self) {
         let LineState::Closed(reason) = self.line_state() else { return };
-        if std::mem::replace(&mut self.connection.is_end_told, true) {
+        if std::mem::replace(&mut self.is_end_told, true) {
             return;
         }
         let text = |name| self.language.text(name);
@@ -86,17 +77,17 @@ impl App {
 
     /// True if nothing that this page writes reaches the arm. A person who tries is told.
     pub(super) fn only_watches(&self) -> bool {
-        if self.connection.is_watching {
+        if self.is_watching {
             self.dom.notice(self.language.text("watch-only"));
         }
-        self.connection.is_watching
+        self.is_watching
     }
 
     /// Switches the controls off while the server lets nobody write.
     pub(super) fn show_watching(&mut self) {
         let sharing = SharingState::of(self.client.registers());
         let is_watching = sharing.is_some_and(|sharing| sharing.is_read_only);
-        if !is_watching && !self.connection.is_watching {
+        if !is_watching && !self.is_watching {
             return;
         }
         // The table of registers gets more of them.
@@ -107,6 +98,6 @@ impl App {
                 let _ = control.remove_attribute("disabled");
             }
         }
-        self.connection.is_watching = is_watching;
+        self.is_watching = is_watching;
     }
 }

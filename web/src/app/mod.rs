@@ -7,12 +7,12 @@
 //! ```
 //!
 //! ```text
-//!   dom.rs, storage.rs, kept_recording.rs ──▶ page.rs ──▶ panels.rs, hand.rs, recording.rs ──▶ controls.rs
-//!   (the browser's elements and storage)     (App)      (what it shows, pointers,             (numbers and
-//!                                                        movements)                            buttons)
-//!                ──▶ picture.rs, events.rs, exports.rs ──▶ mod.rs
-//!                    (before each picture; clicks and       (start)
-//!                     keys; tests)
+//!   dom.rs, storage.rs, kept_recording.rs ──▶ page.rs ──▶ panels.rs, hand.rs, recording.rs, ──▶ controls.rs
+//!   (the browser's elements and storage)     (App)      time_line.rs (what it shows,         (numbers and
+//!                                                        pointers, movements)                 buttons)
+//!                ──▶ picture.rs, events.rs, connection.rs, exports.rs ──▶ mod.rs
+//!                    (before each picture; clicks and keys; which          (start)
+//!                     arm it is; tests)
 //! ```
 
 mod class;
@@ -37,6 +37,7 @@ mod programs;
 mod recording;
 mod storage;
 mod time_line;
+mod time_line_state;
 
 use std::cell::RefCell;
 use std::rc::Rc;

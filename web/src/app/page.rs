@@ -11,13 +11,12 @@ use wasm_bindgen::{JsCast, JsValue};
 use web_sys::{CanvasRenderingContext2d, Element, Event};
 
 use super::class_tab::ClassTab;
-use super::connection::Connection;
 use super::dom::Dom;
 use super::exercise_list::Exercises;
 use super::kept_recording::KeptRecording;
 use super::program_state::Programs;
 use super::storage;
-use super::time_line::TimeLines;
+use super::time_line_state::TimeLines;
 use crate::client::Client;
 use crate::movement::Player;
 use crate::park::Park;
@@ -62,7 +61,10 @@ pub(super) struct App {
     pub(super) dom: Dom,
     pub(super) line: Line,
     pub(super) client: Client,
-    pub(super) connection: Connection,
+    /// A person knows that the connection has ended.
+    pub(super) is_end_told: bool,
+    /// The controls are switched off, because the server lets nobody write.
+    pub(super) is_watching: bool,
     /// `None` where the browser has no WebGL2.
     pub(super) scene: Option<Scene>,
     pub(super) plot: CanvasRenderingContext2d,
@@ -176,7 +178,8 @@ impl App {
             dom,
             line: Line::Simulated(Box::default()),
             client: Client::default(),
-            connection: Connection::default(),
+            is_end_told: false,
+            is_watching: false,
             scene: scene.ok(),
             plot,
             history: History::new(PLOT_SECONDS),
@@ -311,7 +314,7 @@ impl App {
         let before = (std::mem::replace(&mut self.line, line.0), std::mem::replace(&mut self.client, line.1));
         (self.shown_round, self.slid_round) = (0, 0);
         (self.hand, self.unreachable) = (None, None);
-        self.connection.is_end_told = false;
+        self.is_end_told = false;
         (self.recorder, self.player, self.park) = (None, None, None);
         self.programs.run = None;
         self.exercises.end();

@@ -9,34 +9,10 @@ use web_sys::HtmlInputElement;
 
 use super::dom::{number, set_attribute};
 use super::page::{App, Line, browser_now};
+use super::time_line_state::TimeLines;
 use crate::preview::{Preview, PreviewEnd};
-use crate::scene::Angles;
-use crate::time_line::{Stand, TimeLine};
+use crate::time_line::TimeLine;
 use crate::words;
-
-/// What the page has of time lines.
-#[derive(Default)]
-pub(super) struct TimeLines {
-    preview: Option<Preview>,
-    shown: Option<TimeLine>,
-    at: Duration,
-}
-
-impl TimeLines {
-    fn stand(&self) -> Option<Stand> {
-        self.shown.as_ref()?.at(self.at)
-    }
-
-    /// The angles of the ghost.
-    pub(super) fn angles(&self) -> Option<Angles> {
-        self.stand().map(|stand| stand.angles)
-    }
-
-    /// The block of the program at this moment.
-    pub(super) fn block(&self) -> Option<String> {
-        self.stand()?.block.map(|block| block.to_string())
-    }
-}
 
 impl App {
     /// Does what a button asks for. Returns whether it is one of time lines.
