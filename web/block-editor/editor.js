@@ -19,15 +19,20 @@ var blockEditor = (() => {
     },
   });
   const theme = () => (prefersDark.matches ? dark : Blockly.Themes.Classic);
-  prefersDark.addEventListener("change", () => workspace?.setTheme(theme()));
+  prefersDark.addEventListener("change", () => {
+    workspace?.setTheme(theme());
+    adoptStyles();
+  });
 
+  // White text can be read on blocks of this brightness: at least 4.5 to 1.
+  Blockly.utils.colour.setHsvValue(0.5);
   Blockly.dialog.setPrompt(ask);
   // The page shows what happens in its own places.
   Blockly.dialog.setAlert((_, done) => done?.());
 
   // Blockly makes its styles as text, which the content security policy does not allow as an element.
   function adoptStyles() {
-    for (const text of document.querySelectorAll("template[id^=blockly]")) {
+    for (const text of document.querySelectorAll("template#blockly-common-style, template.blockly-renderer-style")) {
       if (text.dataset.adopted) continue;
       text.dataset.adopted = "yes";
       const sheet = new CSSStyleSheet();

@@ -110,6 +110,7 @@ impl App {
             && let Some(element) = self.dom.element("blocks")
         {
             Editor.open(&element, self.language.tag(), Self::program_changed);
+            self.programs.lit.clear();
             self.program_changed();
         }
     }

@@ -6,6 +6,8 @@ use browser_tests::page::{DARK, DESKTOP, PHONE};
 use browser_tests::picture::{Picture, write_animation};
 use browser_tests::{ClassRun, Page, Viewed};
 
+use super::programs::{open_file, open_programs};
+
 fn keep(page: &mut Page, name: &str) {
     std::fs::write(folder().join(name), page.screenshot()).expect("a file");
 }
@@ -55,6 +57,29 @@ fn write_the_picture_of_a_room() {
     page.pass(2.0);
     page.centre("#scene");
     keep(&mut page, "web-room.png");
+}
+
+/// A preview half way, and the same in Chinese on a dark screen.
+#[test]
+#[ignore = "writes docs/web-programs.png and docs/web-chinese.png"]
+fn write_the_pictures_of_programs() {
+    let viewed = Viewed::without_arm();
+    let mut page = viewed.open();
+    open_programs(&mut page);
+    let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("../block-programs/examples");
+    open_file(&mut page, &examples.join("joints.json"), "arm");
+    page.click("[data-action=preview]");
+    page.wait_for_text("#moment-text", " s · ");
+    page.focus("#moment");
+    page.keys("ArrowRight", 60);
+    page.evaluate("scrollTo(0, 0)");
+    page.pass(1.0);
+    keep(&mut page, "web-programs.png");
+    page.click("[data-action=language]");
+    page.show_on(DARK);
+    page.evaluate("scrollTo(0, 0)");
+    page.pass(1.0);
+    keep(&mut page, "web-chinese.png");
 }
 
 #[test]

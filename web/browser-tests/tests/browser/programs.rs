@@ -350,6 +350,9 @@ fn the_editor_speaks_chinese_and_fits_a_phone() {
 fn the_editor_has_the_colours_that_the_user_prefers() {
     let viewed = Viewed::without_arm();
     let mut page = programs(&viewed);
+    // The numbers of a pose are fields of the block itself.
+    let pose = examples().into_iter().find(|path| path.ends_with("joints.json")).expect("it is there");
+    open_file(&mut page, &pose, "arm.pose");
     for (screen, colour) in
         [(DESKTOP, "rgb(255, 255, 255)"), (DARK, "rgb(27, 33, 42)"), (DESKTOP, "rgb(255, 255, 255)")]
     {
@@ -359,5 +362,9 @@ fn the_editor_has_the_colours_that_the_user_prefers() {
             let found = page.evaluate(ground);
             if found == colour { Ok(()) } else { Err(format!("{found} on {screen:?}")) }
         });
+        let fields = "[...new Set([...document.querySelectorAll('.blocklyNumberField')].flatMap(field =>
+            [...field.querySelectorAll('rect, text')].map(part => getComputedStyle(part).fill)))].sort().join(' ')";
+        // White, and grey text on it.
+        assert_eq!(page.evaluate(fields), "rgb(255, 255, 255) rgb(87, 94, 117)", "{screen:?}");
     }
 }
