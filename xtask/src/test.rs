@@ -41,32 +41,38 @@ const LONG_FUZZ_SECONDS: u64 = 300;
 /// The steps, in order, until one fails. Steps that mostly wait run beside steps that compute. Tests come last, so
 /// that their output is at the end.
 const STAGES: &[Stage] = &[
-    &[&[
-        quick("tools that the steps need", install::all),
-        quick("format", || cargo("fmt --all --check")),
-        quick("lints, host", || cargo(&format!("clippy {CHECKED} --all-targets -- -D warnings"))),
-        quick("lints, host tests of the firmware", || {
-            cargo("clippy -p firmware-stm32 --lib --tests -- -D warnings")
-        }),
-        quick("lints, chip", || {
-            cargo(&format!("clippy -p footprint -p firmware-stm32 --target {CHIP} -- -D warnings"))
-        }),
-        quick("lints, Windows and macOS", dist::lint_other_systems),
-        quick("docs/registers.md is up to date", registers_md::check),
-        quick("the model in the ROS packages is up to date", ros_model::check),
-        quick("every decision of docs/protocol.md has tests", decisions::check),
-        quick("the crates in docs/design.md are up to date", crate_graph::check),
-        quick("no cycle between files of a crate", modules::check),
-        quick("licences, versions and sources of dependencies", deny::rules),
-        whole("documentation", || {
-            run("cargo", &format!("doc {CHECKED} --no-deps"), &[("RUSTDOCFLAGS", "-D warnings")])
-        }),
-        whole("no panic is reachable", no_panic::check),
-        whole("flash, RAM and stack are within their budgets", || footprint::check(false)),
-        quick("the simulated arm builds for a browser, without an operating system", build_for_browser),
-        quick("the page builds within its budget", web::build),
-        quick("programs and tests", || cargo(&format!("test {TESTED} --no-run"))),
-    ]],
+    &[&[quick("tools that the steps need", install::all), quick("format", || cargo("fmt --all --check"))]],
+    &[
+        // What shares the build directory of the tests,
+        &[
+            quick("lints, host", || cargo(&format!("clippy {CHECKED} --all-targets -- -D warnings"))),
+            quick("lints, host tests of the firmware", || {
+                cargo("clippy -p firmware-stm32 --lib --tests -- -D warnings")
+            }),
+            quick("lints, chip", || {
+                cargo(&format!("clippy -p footprint -p firmware-stm32 --target {CHIP} -- -D warnings"))
+            }),
+            quick("docs/registers.md is up to date", registers_md::check),
+            quick("the model in the ROS packages is up to date", ros_model::check),
+            quick("every decision of docs/protocol.md has tests", decisions::check),
+            quick("the crates in docs/design.md are up to date", crate_graph::check),
+            quick("no cycle between files of a crate", modules::check),
+            quick("licences, versions and sources of dependencies", deny::rules),
+            whole("documentation", || {
+                run("cargo", &format!("doc {CHECKED} --no-deps"), &[("RUSTDOCFLAGS", "-D warnings")])
+            }),
+            quick("the simulated arm builds for a browser, without an operating system", build_for_browser),
+            // One of the programs contains the page.
+            quick("the page builds within its budget", web::build),
+            quick("programs and tests", || cargo(&format!("test {TESTED} --no-run"))),
+        ],
+        // beside what has others: cargo lets one build at a time into each.
+        &[
+            quick("lints, Windows and macOS", dist::lint_other_systems),
+            whole("no panic is reachable", no_panic::check),
+            whole("flash, RAM and stack are within their budgets", || footprint::check(false)),
+        ],
+    ],
     &[
         // What computes,
         &[
@@ -74,6 +80,7 @@ const STAGES: &[Stage] = &[
             whole("instructions are within their budgets", || count::check(false)),
             whole("recorded sessions, natively and in a WebAssembly module", replays::short),
             whole("worlds with injected faults", torture::short),
+            whole("fuzzing", fuzz::fixed),
         ],
         // beside what mostly waits for an arm, a browser or a network.
         &[
@@ -89,7 +96,6 @@ const STAGES: &[Stage] = &[
             }),
             whole("the Python package", python::check),
             whole("the ROS packages", ros::check),
-            whole("fuzzing", fuzz::fixed),
         ],
     ],
     &[&[

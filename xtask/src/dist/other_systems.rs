@@ -2,7 +2,7 @@
 
 use super::platform::{WINDOWS, add_target};
 use super::tools;
-use crate::run::{TaskResult, root, run_command};
+use crate::run::{TaskResult, root, run_command, target_directory};
 
 const SYSTEMS: [&str; 3] = [WINDOWS.triple, "aarch64-apple-darwin", "x86_64-apple-darwin"];
 /// All other crates that run there are dependencies of these.
@@ -10,10 +10,12 @@ const PACKAGES: [&str; 3] = ["sevenbot-cli", "sevenbot-python", "sevenbot-serve"
 
 /// Lints the packages. The C code among their dependencies is compiled by zig.
 pub(crate) fn lint_other_systems() -> TaskResult {
+    // Another build goes on beside this one, and would wait for its lock.
+    let folder = target_directory().join("other-systems");
     for system in SYSTEMS {
         add_target(system)?;
         let mut clippy = tools::cargo_with_zig("clippy")?;
-        clippy.args(["--quiet", "--target", system]);
+        clippy.args(["--quiet", "--target", system]).arg("--target-dir").arg(&folder);
         clippy.args(PACKAGES.iter().flat_map(|package| ["--package", package]));
         run_command(clippy.args(["--", "-D", "warnings"]).current_dir(root()))?;
     }
