@@ -84,7 +84,7 @@ impl SetPointStream<'_> {
                 return Ok(());
             }
             if now >= deadline {
-                return Err(MoveError::NotReached { away, missing: 0 }.into());
+                return Err(MoveError::NotReached { away, missing: 0, retargeted: 0 }.into());
             }
             wait(self, now + self.period())?;
         }

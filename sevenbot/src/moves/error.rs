@@ -51,12 +51,19 @@ pub enum MoveError {
         after: Duration,
     },
     /// Joints have settled away from their targets.
-    #[error("the arm did not reach the pose: {}{}", away_text(away), missing_text(*missing))]
+    #[error(
+        "the arm did not reach the pose: {}{}{}",
+        away_text(away),
+        missing_text(*missing),
+        retargeted_text(*retargeted)
+    )]
     NotReached {
         /// Joint, position and target in degrees.
         away: Vec<(Joint, u8, u8)>,
         /// The joints whose servo does not answer; bit 0 is joint 1.
         missing: u8,
+        /// The joints that have another target by now; bit 0 is joint 1.
+        retargeted: u8,
     },
     /// The arm was told to hold, and has other targets since.
     #[error("the arm does not hold: another program has sent it elsewhere")]
@@ -143,6 +150,13 @@ fn away_text(away: &[(Joint, u8, u8)]) -> String {
     let words =
         away.iter().map(|(joint, is, goal)| format!("joint {} is at {is}°, not {goal}°", joint.number()));
     words.collect::<Vec<_>>().join(", ")
+}
+
+fn retargeted_text(retargeted: u8) -> String {
+    match retargeted {
+        0 => String::new(),
+        bits => format!("; another program has stopped or moved {} meanwhile", joints(bits)),
+    }
 }
 
 fn missing_text(missing: u8) -> String {

@@ -228,7 +228,7 @@ impl JointMove {
         }
         match self.away(&last, TOLERANCE_DEGREES, state).as_slice() {
             [] => Ok(last),
-            away => Err(not_reached(arm, away.to_vec())),
+            away => Err(self.not_reached(arm, away.to_vec())),
         }
     }
 
@@ -238,6 +238,19 @@ impl JointMove {
         let velocities = fine.velocities.into_iter().zip(self.targets);
         let mut ours = velocities.filter(|(_, goal)| goal.is_some());
         Ok(ours.all(|(velocity, _)| velocity.unsigned_abs() < STILL_VELOCITY))
+    }
+
+    /// Why the joints settled away from their targets.
+    fn not_reached(&self, arm: &mut Arm, away: Vec<(Joint, u8, u8)>) -> MoveError {
+        let known = arm.driven_joints().and_then(|joints| {
+            let missing = arm.status()?.map_or(0, |status| status.missing());
+            let retargeted = self.goals().filter(|(joint, goal)| joints.target(*joint) != *goal);
+            Ok((missing, retargeted.fold(0, |bits, (joint, _)| bits | joint.bit())))
+        });
+        match known {
+            Ok((missing, retargeted)) => MoveError::NotReached { away, missing, retargeted },
+            Err(error) => error,
+        }
     }
 
     fn elapsed(&self, arm: &Arm) -> Duration {
@@ -283,15 +296,6 @@ fn pause(arm: &mut Arm, observer: &mut dyn Observer) -> Result<(), MoveError> {
     }
     observer.pause(arm, POLL_PERIOD);
     Ok(())
-}
-
-/// Why the joints settled away from their targets.
-fn not_reached(arm: &mut Arm, away: Vec<(Joint, u8, u8)>) -> MoveError {
-    let missing = arm.driven_joints().and_then(|_| Ok(arm.status()?.map_or(0, |status| status.missing())));
-    match missing {
-        Ok(missing) => MoveError::NotReached { away, missing },
-        Err(error) => error,
-    }
 }
 
 fn positions(arm: &mut Arm) -> Result<[u8; 7], Error> {

@@ -145,6 +145,24 @@ fn d27_a_wait_ends_when_its_joint_is_blocked() {
     }
 }
 
+#[test]
+fn a_wait_tells_that_another_program_has_stopped_the_arm() {
+    let base_only = [Some(150), None, None, None, None, None, None];
+    for (stopped, words) in [(true, "; another program has stopped or moved joint 1 meanwhile"), (false, "")]
+    {
+        let (mut arm, registers, _held) = arm();
+        let sent = JointMove::begin(&mut arm, base_only).unwrap();
+        if stopped {
+            registers.lock().unwrap()[46] = 115;
+        }
+        let error = sent.finish(&mut arm, &mut ()).unwrap_err();
+        assert!(matches!(error, MoveError::NotReached { .. }), "{error:?}");
+        let position = registers.lock().unwrap()[54];
+        let wanted = format!("the arm did not reach the pose: joint 1 is at {position}°, not 150°{words}");
+        assert_eq!(error.to_string(), wanted);
+    }
+}
+
 /// Checks until the stream tells a problem.
 fn wait_for_problem(stream: &mut SetPointStream<'_>) -> MoveCheckError {
     let deadline = Instant::now() + Duration::from_secs(30);

@@ -105,8 +105,11 @@ impl CommandChecker {
     /// A joint that let go engages when its alarm has been gone for a while (D28). If it let go soon after it had got torque, the
     /// controller may take its order for lost.
     fn check_alarm_is_over(&self, joint: Joint, context: &CommandContext<'_>) -> Check {
-        let is_calm = context.bus.truth(joint).is_calm(context.now);
-        ensure(is_calm || !self.was_let_go(joint, context), || {
+        let truth = context.bus.truth(joint);
+        // A joint that nothing moved counts as held, and is driven on after a silence.
+        let was_held =
+            self.was_silent(joint) && truth.lost_at().is_some_and(|at| !truth.has_turned_since(at));
+        ensure(truth.is_calm(context.now) || was_held || !self.was_let_go(joint, context), || {
             format!("joint {} is given torque before its alarm is over", joint.number())
         })
     }
@@ -114,13 +117,17 @@ impl CommandChecker {
     /// A joint that was let go engages three times in a minute, and then only after register 29 was written (D28).
     fn check_attempts(&mut self, joint: Joint, context: &CommandContext<'_>) -> Check {
         // The servo of a joint that fell silent may have restarted unnoticed. Such a joint is not let go.
-        let was_silent = self.servo_lost_at[joint] > self.engaged_at[joint];
-        if was_silent || !self.was_let_go(joint, context) {
+        if self.was_silent(joint) || !self.was_let_go(joint, context) {
             return Ok(());
         }
         ensure(!self.attempts[joint].add_after_let_go(context.now), || {
             format!("joint {} was let go and is given torque for the fourth time in a minute", joint.number())
         })
+    }
+
+    /// True if its servo fell silent since it was last given torque.
+    fn was_silent(&self, joint: Joint) -> bool {
+        self.servo_lost_at[joint] > self.engaged_at[joint]
     }
 
     /// True if the joint was let go since it was last given torque, and the controller knows that.
