@@ -18,12 +18,16 @@ use crate::time_line::{Stand, TimeLine};
 const STEP_MICROS: f64 = 20_000.0;
 /// The time line has ten moments a second.
 const STEPS_BETWEEN_STANDS: u32 = 5;
+/// A client knows an arm after its second round of reads.
+const ROUNDS_TO_KNOW: u64 = 2;
 /// After five minutes of a program its preview ends.
 const MOST_STEPS: u32 = 15_000;
 /// A new arm has engaged its joints after two seconds.
 const STEPS_TO_START: u32 = 100;
 /// It is in any pose after three more.
 const STEPS_TO_POSE: u32 = 150;
+/// This near to it, in degrees: servos have play, and the claw may hold something.
+const NEAR: f32 = 3.0;
 
 /// How a preview has ended.
 #[derive(Clone, Debug, PartialEq)]
@@ -53,28 +57,35 @@ impl Preview {
         let (mut client, mut arm) = (Client::default(), arm.clone());
         // What the arm has sent before is for the page.
         drop(arm.receive());
-        pass(&mut client, &mut arm, STEPS_TO_START);
+        for _ in 0..STEPS_TO_START {
+            if client.rounds() >= ROUNDS_TO_KNOW {
+                break;
+            }
+            pass(&mut client, &mut arm, 1);
+        }
         Self::begin(client, arm, program)
     }
 
-    /// Tries a program on a new simulated arm in the pose and with the speeds of these registers. It stands on an
-    /// empty table.
+    /// Tries a program on a new simulated arm in the pose and with the speeds of these registers. It stands on an empty table.
+    /// `None` if it does not get into the pose.
     #[must_use]
-    pub fn on_new_arm(registers: &Snapshot, program: &Program) -> Self {
+    pub fn on_new_arm(registers: &Snapshot, program: &Program) -> Option<Self> {
         let (mut client, mut arm) = (Client::default(), SimulatedSource::default());
         pass(&mut client, &mut arm, STEPS_TO_START);
         client.write(arm.now(), SPEED.address, &[0; 7]);
-        for (joint, angle) in (1..).zip(ArmState::new(registers).angles()) {
-            if let Some((address, values)) = target_frame(client.registers(), joint, angle) {
-                client.write(arm.now(), address, &values);
-            }
+        let pose = ArmState::new(registers).angles();
+        for (joint, angle) in (1..).zip(pose) {
+            let (address, values) = target_frame(client.registers(), joint, angle)?;
+            client.write(arm.now(), address, &values);
         }
         pass(&mut client, &mut arm, STEPS_TO_POSE);
+        let there = client.state().angles();
+        let is_near = pose.iter().zip(there).take(6).all(|(wanted, angle)| (wanted - angle).abs() < NEAR);
         for row in [SPEED, TIME] {
             client.write(arm.now(), row.address, &registers.joints(&row));
         }
         pass(&mut client, &mut arm, STEPS_BETWEEN_STANDS);
-        Self::begin(client, arm, program)
+        is_near.then(|| Self::begin(client, arm, program))
     }
 
     fn begin(client: Client, arm: SimulatedSource, program: &Program) -> Self {
@@ -166,7 +177,7 @@ mod tests {
             let mut tab = Tab::new();
             let before = tab.angles();
             let on_copy = end_of(Preview::on_copy_of(&tab.arm, &program));
-            let on_new = end_of(Preview::on_new_arm(tab.client.registers(), &program));
+            let on_new = end_of(Preview::on_new_arm(tab.client.registers(), &program).expect("a pose"));
             assert_eq!(tab.angles(), before);
             tab.run(&workspace, |_, _| ());
             for (end, time_line) in [on_copy, on_new] {

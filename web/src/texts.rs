@@ -330,6 +330,11 @@ const TEXTS: &[(&str, &str, &str)] = &[
          address that it prints.",
         "此地址没有机械臂，或地址已失效。请在机械臂旁运行 `sevenbot view`，并打开它显示的地址。",
     ),
+    (
+        "line-ended",
+        "The connection to the arm has ended. What is shown is its last state.",
+        "与机械臂的连接已断开，显示的是最后的状态。",
+    ),
     ("closed", "The connection ended:", "连接已断开："),
     (
         "server-ended",
@@ -371,8 +376,23 @@ const TEXTS: &[(&str, &str, &str)] = &[
     ("preview-runs", "A simulated arm tries the program …", "正在用模拟机械臂预演程序……"),
     (
         "preview-too-long",
-        "The preview ends after five minutes. The program goes on.",
+        "The program would take longer than the five minutes of a preview.",
         "预演只到五分钟为止，程序本身还会继续。",
+    ),
+    (
+        "preview-busy",
+        "A preview begins with an arm that stands. Wait until it does, or stop it.",
+        "预演要从静止的机械臂开始。请等它停下，或先停止它。",
+    ),
+    (
+        "preview-missing",
+        "There is no preview while a joint does not answer: the program would end there.",
+        "有关节没有应答时无法预演：程序也会在那里结束。",
+    ),
+    (
+        "preview-elsewhere",
+        "There is no preview: the simulated arm cannot stand as this arm does.",
+        "无法预演：模拟机械臂不能摆成此机械臂的姿态。",
     ),
     ("preview-failed", "In the preview the program ends early.", "预演中程序提前结束。"),
     ("time-line", "Time line", "时间轴"),

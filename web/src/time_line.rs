@@ -51,7 +51,7 @@ impl TimeLine {
     pub fn at(&self, time: Duration) -> Option<Stand> {
         let next = self.stands.partition_point(|stand| stand.time <= time);
         let before = self.stands.get(next.saturating_sub(1))?;
-        let Some(after) = self.stands.get(next).filter(|after| after.time > before.time && next > 0) else {
+        let Some(after) = self.stands.get(next).filter(|_| next > 0) else {
             return Some(before.clone());
         };
         let part = (time - before.time).div_duration_f32(after.time - before.time);

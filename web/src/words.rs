@@ -46,6 +46,8 @@ pub enum Answers {
     Yes,
     /// It did.
     NoLonger,
+    /// The line to it has ended.
+    LineEnded,
 }
 
 /// The line, and its mood: the most important thing first. `doing` is the name of the text of what the page does with the arm.
@@ -61,6 +63,7 @@ pub fn state_line(
     match answers {
         Answers::NotYet => return plain("connecting"),
         Answers::NoLonger => return bad("lost"),
+        Answers::LineEnded => return bad("line-ended"),
         Answers::Yes => {}
     }
     match stop {

@@ -34,6 +34,7 @@ const VERSION: &str = "import sys; assert sys.version_info >= (3, 10); print('%d
 pub(crate) fn check() -> TaskResult {
     let wheel = wheel()?;
     // Programs of blocks run on it.
+    emulator::need_qemu()?;
     build_image()?;
     for (version, program) in &interpreters() {
         println!("Python {version}");

@@ -79,15 +79,15 @@ impl Viewed {
         command
     }
 
-    /// Begins a movement of joint 1, ends it by `sevenbot stop`, and waits until the page says so. On a busy machine the page may
+    /// Begins a movement of joint 1 with this action, ends it by `sevenbot stop`, and waits until the page says so. On a busy machine the page may
     /// pause for a second, which ends a movement, too: then it begins again.
     ///
     /// # Panics
     /// The movement ends for another reason, or the page pauses each time.
-    pub fn stop_by_another_program(&self, page: &mut Page, begin: impl Fn(&mut Page)) {
+    pub fn stop_by_another_program(&self, page: &mut Page, action: &str) {
         for _ in 0..10 {
+            page.click(&format!("[data-action={action}]"));
             let start = page.measured()[0];
-            begin(page);
             wait_for("joint 1 turns", || {
                 let (measured, notice) = (page.measured()[0], page.text("#notice"));
                 if measured > start + 1.0 || notice.contains("ended early") {

@@ -65,14 +65,16 @@ impl App {
         if std::mem::replace(&mut self.is_end_told, true) {
             return;
         }
-        let text = |name| self.language.text(name);
-        let is_server = self.dom.choice("source") == "server";
-        let notice = match (self.client.rounds(), is_server) {
-            (0, _) => format!("{} {reason}", text("no-server")),
-            (_, true) => format!("{} {reason}", text("server-ended")),
-            (_, false) => format!("{} {reason}", text("closed")),
+        // A class tells by itself what becomes of its arm.
+        if self.class.is_some() {
+            return;
+        }
+        let text = match (self.client.rounds(), self.dom.choice("source") == "server") {
+            (0, true) => "no-server",
+            (_, true) => "server-ended",
+            (_, false) => "closed",
         };
-        self.dom.notice(notice.trim_end());
+        self.dom.notice(format!("{} {reason}", self.language.text(text)).trim_end());
     }
 
     /// True if nothing that this page writes reaches the arm. A person who tries is told.

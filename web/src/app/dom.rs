@@ -109,6 +109,13 @@ impl Dom {
         self.set_text("notice", "");
     }
 
+    /// Takes this notice back, if no other one was given since.
+    pub(super) fn end_notice_of(&self, text: &str) {
+        if self.element("notice").and_then(|notice| notice.text_content()).as_deref() == Some(text) {
+            self.end_notice();
+        }
+    }
+
     /// Is this element the one with the keyboard's focus?
     pub(super) fn has_focus(&self, element: &Element) -> bool {
         self.0.active_element().is_some_and(|active| active == *element)

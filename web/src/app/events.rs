@@ -105,6 +105,7 @@ impl App {
         // A target would be one point of the stream of a movement, and the next point would lead back.
         let moves = [MOTOR_STATE, TARGET_POSITION, FINE_TARGET].iter().any(|row| row.holds(address));
         if moves {
+            self.show_time_line(None);
             self.end_movement();
         }
         self.client.write(now, address, values);
@@ -140,6 +141,7 @@ impl App {
     }
 
     fn begin_park(&mut self) {
+        self.show_time_line(None);
         let speeds = self.end_movement().unwrap_or_else(|| self.client.registers().joints(&SPEED));
         self.park = Park::new(&self.client.state(), speeds);
         let text = if self.park.is_some() { "parking" } else { "park-failed" };

@@ -12,6 +12,7 @@ use web_sys::{Element, HtmlInputElement};
 use super::dom::{Dom, set_attribute, set_text};
 use super::page::{App, Line};
 use crate::arm_state::{ArmState, has_extended_block, misplaced, tip};
+use crate::source::LineState;
 use crate::texts::Language;
 use crate::words::{Answers, state_line};
 
@@ -59,6 +60,8 @@ pub(super) fn build(dom: &Dom) -> Result<(), JsValue> {
 pub(super) fn show(app: &mut App, state: &ArmState) {
     app.show_watching();
     show_line(app, state);
+    show_recording(app);
+    app.show_program();
     if app.client.rounds() == 0 {
         return show_nothing_known(&app.dom, app.language);
     }
@@ -77,8 +80,6 @@ pub(super) fn show(app: &mut App, state: &ArmState) {
     let reach = reach.map_or(String::new(), |why| format!(" · {}", language.text(why)));
     dom.set_text("tip", &format!("{}: x {x:.0}, y {y:.0}, z {z:.0} mm{reach}", language.text("tip")));
     dom.set_text("health", &health(app, state));
-    show_recording(app);
-    app.show_program();
     if let Line::Simulated(source) = &app.line {
         app.dom.set_text("time", &format!("{:.1} s", seconds(source.now())));
     }
@@ -125,10 +126,11 @@ fn health(app: &App, state: &ArmState) -> String {
 }
 
 fn show_line(app: &mut App, state: &ArmState) {
-    let answers = match (app.client.rounds(), app.client.is_connected()) {
-        (_, true) => Answers::Yes,
-        (0, _) => Answers::NotYet,
-        _ => Answers::NoLonger,
+    let answers = match (app.client.rounds(), app.line_state(), app.client.is_connected()) {
+        (0, ..) => Answers::NotYet,
+        (_, LineState::Closed(_), _) => Answers::LineEnded,
+        (.., true) => Answers::Yes,
+        (.., false) => Answers::NoLonger,
     };
     let doing = match (&app.player, &app.park, &app.programs.run) {
         (Some(_), ..) => Some("plays"),
@@ -137,9 +139,7 @@ fn show_line(app: &mut App, state: &ArmState) {
         _ => None,
     };
     let (line, mood) = state_line(app.language, answers, state, (app.client.stop_progress(), doing));
-    let sharing = SharingState::of(app.client.registers());
-    let watching =
-        sharing.filter(|sharing| sharing.is_read_only).map_or("", |_| app.language.text("watch-only"));
+    let watching = if app.is_watching { app.language.text("watch-only") } else { "" };
     app.dom.set_text("state", format!("{line} {watching}").trim_end());
     if let Some(element) = app.dom.element("state") {
         set_attribute(&element, "class", mood.class());

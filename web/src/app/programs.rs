@@ -153,7 +153,8 @@ impl App {
     /// Begins the program, or goes on with it.
     fn run_program(&mut self, pace: Pace) {
         if let Some(run) = &mut self.programs.run {
-            return run.go_on(pace);
+            run.go_on(pace);
+            return self.show_time_line(None);
         }
         if self.client.stop_progress() == StopProgress::Verifying {
             return self.dom.notice(self.language.text("stopping"));

@@ -33,6 +33,7 @@ impl App {
 
     fn keep(&mut self, recording: KeptRecording) {
         recording.store();
+        self.end_look();
         self.recording = Some(recording);
         self.dom.end_notice();
     }

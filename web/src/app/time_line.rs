@@ -4,6 +4,7 @@
 use std::time::Duration;
 
 use block_programs::Program;
+use sevenbot::map::motor_state;
 use sevenbot::recording::Recording;
 use web_sys::HtmlInputElement;
 
@@ -13,6 +14,11 @@ use super::time_line_state::TimeLines;
 use crate::preview::{Preview, PreviewEnd};
 use crate::time_line::TimeLine;
 use crate::words;
+
+/// The step of the slider, in seconds: as in index.html.
+const STEP: f64 = 0.05;
+/// The name of the text that is shown while a program is tried.
+const PREVIEW_RUNS: &str = "preview-runs";
 
 impl App {
     /// Does what a button asks for. Returns whether it is one of time lines.
@@ -27,25 +33,46 @@ impl App {
     }
 
     fn begin_preview(&mut self) {
-        if self.client.rounds() == 0 {
-            return self.dom.notice(self.language.text("connecting"));
+        if let Some(why) = self.no_preview() {
+            return self.dom.notice(self.language.text(why));
         }
-        match Program::parse(&self.programs.text) {
-            Err(error) => self.show_program_error(&error),
-            Ok(program) => {
-                self.show_time_line(None);
-                self.time_lines.preview = Some(match &self.line {
-                    Line::Simulated(arm) => Preview::on_copy_of(arm, &program),
-                    Line::Remote(_) => Preview::on_new_arm(self.client.registers(), &program),
-                });
-                self.dom.notice(self.language.text("preview-runs"));
-            }
+        let program = match Program::parse(&self.programs.text) {
+            Err(error) => return self.show_program_error(&error),
+            Ok(program) => program,
+        };
+        self.show_time_line(None);
+        let preview = match &self.line {
+            Line::Simulated(arm) => Some(Preview::on_copy_of(arm, &program)),
+            Line::Remote(_) => Preview::on_new_arm(self.client.registers(), &program),
+        };
+        let text = if preview.is_some() { PREVIEW_RUNS } else { "preview-elsewhere" };
+        self.dom.notice(self.language.text(text));
+        self.time_lines.preview = preview;
+    }
+
+    /// The name of the text that says why there can be no preview now. It would begin with an arm that moves, or that does not.
+    fn no_preview(&self) -> Option<&'static str> {
+        let is_busy = self.player.is_some() || self.park.is_some() || self.programs.run.is_some();
+        let state = self.client.state();
+        match self.client.rounds() {
+            0 => Some("connecting"),
+            _ if is_busy || state.moving != 0 => Some("preview-busy"),
+            _ if state.motor_state != motor_state::SERVO => Some("motors-are-off"),
+            _ if state.missing != 0 => Some("preview-missing"),
+            _ => None,
         }
     }
 
     /// The program is another one now.
     pub(super) fn end_preview(&mut self) {
-        if self.time_lines.preview.is_some() || self.time_lines.block().is_some() {
+        if self.time_lines.preview.is_some() || self.time_lines.is_preview {
+            self.show_time_line(None);
+        }
+    }
+
+    /// The recording is another one now.
+    pub(super) fn end_look(&mut self) {
+        if self.time_lines.shown.is_some() && !self.time_lines.is_preview {
             self.show_time_line(None);
         }
     }
@@ -57,13 +84,14 @@ impl App {
             self.time_lines.preview = Some(preview);
             return;
         };
-        self.dom.end_notice();
+        self.dom.end_notice_of(self.language.text(PREVIEW_RUNS));
         match end {
             PreviewEnd::Over => {}
             PreviewEnd::TooLong => self.dom.notice(self.language.text("preview-too-long")),
             PreviewEnd::Failed(failure) => self.dom.notice(&words::preview_failure(self.language, &failure)),
         }
         self.show_time_line(Some(preview.into_time_line()));
+        self.time_lines.is_preview = true;
     }
 
     fn look_through_recording(&mut self) {
@@ -75,19 +103,26 @@ impl App {
 
     /// Shows the start of a movement, or none.
     pub(super) fn show_time_line(&mut self, shown: Option<TimeLine>) {
+        if self.time_lines.preview.is_some() {
+            self.dom.end_notice_of(self.language.text(PREVIEW_RUNS));
+        }
         self.dom.set_hidden("time-line", shown.is_none());
         if let (Some(shown), Ok(slider)) = (&shown, self.dom.get::<HtmlInputElement>("moment")) {
-            set_attribute(&slider, "max", &format!("{:.2}", shown.length().as_secs_f64()));
+            // Only whole steps can be chosen. Behind the last moment the arm stands.
+            let steps = (shown.length().as_secs_f64() / STEP).ceil();
+            set_attribute(&slider, "max", &format!("{:.2}", steps * STEP));
             slider.set_value("0");
         }
-        self.time_lines = TimeLines { preview: None, shown, at: Duration::ZERO };
+        self.time_lines = TimeLines { shown, ..TimeLines::default() };
         self.say_moment();
     }
 
     /// The slider was moved.
     pub(super) fn choose_moment(&mut self) {
         let seconds = self.dom.get::<HtmlInputElement>("moment").ok().as_ref().and_then(number);
-        self.time_lines.at = Duration::from_secs_f32(seconds.unwrap_or_default().max(0.0));
+        let at = Duration::from_secs_f32(seconds.unwrap_or_default().max(0.0));
+        let length = self.time_lines.shown.as_ref().map_or(Duration::ZERO, TimeLine::length);
+        self.time_lines.at = at.min(length);
         self.say_moment();
     }
 

@@ -11,6 +11,8 @@ use crate::time_line::{Stand, TimeLine};
 pub(super) struct TimeLines {
     pub(super) preview: Option<Preview>,
     pub(super) shown: Option<TimeLine>,
+    /// It is that of a program, not of a recording.
+    pub(super) is_preview: bool,
     pub(super) at: Duration,
 }
 

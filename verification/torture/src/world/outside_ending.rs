@@ -2,7 +2,7 @@
 
 use protocol_core::registers::Joint;
 
-/// What happens at a time.
+/// What is due at a time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Ending {
     /// The wall goes.

@@ -15,7 +15,7 @@ const LONGEST: Duration = Duration::from_millis(60_000);
 const SHORTEST: Duration = Duration::from_millis(50);
 /// The times of emergency stops, in milliseconds.
 const STOPS: [u64; 3] = [300, 3_000, 30_000];
-/// After an emergency stop, nothing else happens for this time.
+/// After an emergency stop, no other fault begins for this time.
 const AFTER_STOP: Duration = Duration::from_millis(3_000);
 /// So often a servo has an overload once more, and the time between two of them: a joint that fell is at rest, and engages, within
 /// it.
@@ -98,11 +98,12 @@ impl TortureWorld {
         self.endings.push((until, ending));
     }
 
-    /// Ends what is over.
+    /// Ends what is over, and lets servos trip once more.
     pub(super) fn end_outside(&mut self) {
         while let Some(index) = self.endings.iter().position(|(at, _)| *at <= self.now) {
             let (_, ending) = self.endings.swap_remove(index);
-            self.log.event(self.now, format!("end of {ending:?}"));
+            let what = if let Ending::Trip(_) = ending { "once more" } else { "end of" };
+            self.log.event(self.now, format!("{what} {ending:?}"));
             match ending {
                 Ending::Wall(joint) => self.bus.set_wall(self.now, joint, None),
                 Ending::Push(joint) => self.bus.push(self.now, joint, 0),
@@ -116,7 +117,7 @@ impl TortureWorld {
         }
     }
 
-    /// When the next obstacle, push or emergency stop ends.
+    /// When the next of them is due.
     pub(super) fn next_ending(&self) -> Instant {
         self.endings.iter().map(|(at, _)| *at).min().unwrap_or(Instant::FAR_FUTURE)
     }

@@ -229,10 +229,8 @@ fn what_else_moves_the_arm_ends_a_program_and_a_program_ends_that() {
 fn a_stop_of_another_program_ends_a_program() {
     let viewed = Viewed::with_arm();
     let mut page = programs(&viewed);
-    viewed.stop_by_another_program(&mut page, |page| {
-        open_text(&viewed, page, SLOW, "speed=2");
-        page.click("[data-action=run]");
-    });
+    open_text(&viewed, &mut page, SLOW, "speed=2");
+    viewed.stop_by_another_program(&mut page, "run");
     check_it_stands(&mut page);
 }
 

@@ -136,10 +136,10 @@ fn park_or_another_movement_ends_one_that_is_played_and_restores_its_speeds() {
 fn a_stop_of_another_program_ends_a_movement_that_is_played() {
     let viewed = Viewed::with_arm();
     let mut page = viewed.open();
-    viewed.stop_by_another_program(&mut page, |page| {
-        open_slow_movement(&viewed, page);
-        page.click("[data-action=play]");
-    });
+    open_slow_movement(&viewed, &mut page);
+    // A second attempt begins where the first one ended.
+    page.type_into("#approach", "2");
+    viewed.stop_by_another_program(&mut page, "play");
     check_it_stands(&mut page);
 }
 

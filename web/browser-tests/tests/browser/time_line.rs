@@ -32,7 +32,7 @@ fn a_recording_is_looked_through_and_nothing_moves() {
     page.click("[data-action=look]");
     page.wait_for_text("#notice", "There is no movement yet");
     let file = viewed.path("wave.7bot");
-    std::fs::write(&file, "7bot-recording 1\n0 90 115 65 90 90 90 80 0\n4 170 115 65 90 90 90 80 0\n")
+    std::fs::write(&file, "7bot-recording 1\n0 90 115 65 90 90 90 80 0\n4.03 170 115 65 90 90 90 80 0\n")
         .expect("a file");
     page.choose_file("#upload", &file);
     page.wait_for_text("#recording", "recorded: ");
@@ -47,7 +47,21 @@ fn a_recording_is_looked_through_and_nothing_moves() {
     assert!(angles.iter().all(|(before, now)| (before - now).abs() < 0.3), "{angles:?}");
     assert_eq!(page.target(1), 90.0);
     page.click("[data-action=close-time-line]");
-    assert_eq!(page.evaluate("document.querySelector('#time-line').hidden"), true);
+    let is_hidden = "document.querySelector('#time-line').hidden";
+    assert_eq!(page.evaluate(is_hidden), true);
+    // Another recording has another time line, and a move of the arm ends it.
+    page.click("[data-action=look]");
+    assert_eq!(page.evaluate(is_hidden), false);
+    std::fs::write(&file, "7bot-recording 1\n0 90 115 65 90 90 90 80 0\n2 100 115 65 90 90 90 80 0\n")
+        .expect("a file");
+    page.choose_file("#upload", &file);
+    page.wait_for_text("#recording", "2.0 s");
+    assert_eq!(page.evaluate(is_hidden), true);
+    page.click("[data-action=look]");
+    assert_eq!(page.evaluate(is_hidden), false);
+    page.type_into("#target-1", "95");
+    page.wait_until_joint_rests(1, 95.0);
+    assert_eq!(page.evaluate(is_hidden), true);
     assert_eq!(page.errors(), [""; 0]);
 }
 
@@ -81,7 +95,8 @@ fn a_preview_of_a_program_lights_its_blocks_and_moves_nothing() {
         });
         let angles: Vec<_> = before.into_iter().zip(page.measured()).collect();
         assert!(angles.iter().all(|(before, now)| (before - now).abs() < 0.3), "{angles:?}");
-        // Another program has another time line.
+        // Another program has another time line, wherever the slider is.
+        page.key("Home");
         open_text(&viewed, &mut page, SLOW, "speed=2");
         assert_eq!(page.evaluate("document.querySelector('#time-line').hidden"), true);
         assert_eq!(page.errors(), [""; 0]);
@@ -100,4 +115,10 @@ fn a_preview_says_why_a_program_would_end_early() {
     page.click("[data-action=preview]");
     page.wait_for_text("#notice", "In the preview the program ends early. Joint 1");
     assert_eq!(page.target(1), 90.0);
+    page.click("[data-action=repair]");
+    page.wait_until_ready();
+    page.click("[data-action=motors][data-value='2']");
+    page.wait_for_text("#state", "The motors are off.");
+    page.click("[data-action=preview]");
+    page.wait_for_text("#notice", "The motors are off.");
 }

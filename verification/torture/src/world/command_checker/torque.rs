@@ -114,7 +114,8 @@ impl CommandChecker {
         })
     }
 
-    /// A joint that was let go engages three times in a minute, and then only after register 29 was written (D28).
+    /// A joint that was let go engages at most three times in a minute, unless register 29 is written (D28). That it waits for the host
+    /// longer than the minute, a test of motion-core checks.
     fn check_attempts(&mut self, joint: Joint, context: &CommandContext<'_>) -> Check {
         // The servo of a joint that fell silent may have restarted unnoticed. Such a joint is not let go.
         if self.was_silent(joint) || !self.was_let_go(joint, context) {
