@@ -94,8 +94,7 @@ fn a_cube_is_picked_up_by_the_solution_and_put_where_it_should_be() {
     let viewed = Viewed::without_arm();
     let mut page = begun(&viewed, "5");
     page.wait_for_text("#exercise-goals", "○ The cube stands at 90, 180");
-    page.pass(0.2);
-    assert!(is_red_at(&mut page, [0.0, 200.0, -45.0]), "the cube is drawn");
+    wait_until("the cube is drawn", || is_red_at(&mut page, [0.0, 200.0, -45.0]));
     page.click("[data-action=solution]");
     page.wait_for_text("#python", "arm.set(\"effector-type\", 1)");
     page.click("[data-action=run]");
@@ -109,9 +108,9 @@ fn a_scene_is_put_on_the_table_from_a_list_or_a_file() {
     let viewed = Viewed::without_arm();
     let mut page = viewed.open();
     assert!(!is_red_at(&mut page, [0.0, 200.0, -45.0]));
+    page.choose("#room", "cube red 30 40 0 200");
     page.click("[data-action=scene]");
-    page.pass(0.2);
-    assert!(is_red_at(&mut page, [0.0, 200.0, -45.0]));
+    wait_until("the cube is drawn", || is_red_at(&mut page, [0.0, 200.0, -45.0]));
     let file = viewed.path("scene.txt");
     std::fs::write(&file, "# two\ncube red 30 40 80 200\ncube blue 30\n").expect("a file");
     page.choose_file("#open-scene", &file);

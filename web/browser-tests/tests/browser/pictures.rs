@@ -67,7 +67,7 @@ fn write_the_pictures_of_programs() {
     let mut page = viewed.open();
     open_programs(&mut page);
     let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("../block-programs/examples");
-    open_file(&mut page, &examples.join("joints.json"), "arm");
+    open_file(&mut page, &examples.join("joints.json"), "arm.pose");
     page.click("[data-action=preview]");
     page.wait_for_text("#moment-text", " s · ");
     page.focus("#moment");

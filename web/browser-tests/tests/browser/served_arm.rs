@@ -32,9 +32,9 @@ const SERIAL_PORT: &str = "
 fn check_it_moves(page: &mut Page) {
     let start = page.measured()[0];
     page.focus("#joint-1");
-    page.keys("ArrowRight", 30);
-    page.wait_for_state("joint 1 turns", |state| {
-        state["measured"][0].as_f64().is_some_and(|angle| angle > start + 5.0)
+    wait_until("joint 1 turns", || {
+        page.keys("ArrowRight", 30);
+        page.measured()[0] > start + 5.0
     });
     page.key(" ");
     page.wait_for_text("#state", "Stopped: the arm holds.");

@@ -72,7 +72,7 @@ fn a_preview_of_a_program_lights_its_blocks_and_moves_nothing() {
         open_programs(&mut page);
         page.wait_until_ready();
         let example = Path::new(env!("CARGO_MANIFEST_DIR")).join("../block-programs/examples/joints.json");
-        open_file(&mut page, &example, "arm");
+        open_file(&mut page, &example, "arm.pose");
         let before = page.measured();
         page.click("[data-action=preview]");
         wait_for("the time line is there", || {
