@@ -79,11 +79,11 @@ impl Viewed {
         command
     }
 
-    /// Begins a movement of joint 1 with this action, ends it by `sevenbot stop`, and waits until the page says so. On a busy machine the page may
-    /// pause for a second, which ends a movement, too: then it begins again.
+    /// Begins a movement of joint 1 with this action, ends it by `sevenbot stop`, and waits until the page says so. On a busy
+    /// machine the page may pause for a second, or miss replies, which ends a movement, too: then it begins again.
     ///
     /// # Panics
-    /// The movement ends for another reason, or the page pauses each time.
+    /// The movement ends for another reason, or is late each time.
     pub fn stop_by_another_program(&self, page: &mut Page, action: &str) {
         for _ in 0..10 {
             page.click(&format!("[data-action={action}]"));
@@ -109,7 +109,7 @@ impl Viewed {
                 ["did not run for a while", "does not answer"].iter().any(|part| notice.contains(part));
             assert!(is_late, "{notice}");
         }
-        panic!("the page pauses each time");
+        panic!("the page is late each time");
     }
 
     /// The address without path and token.
