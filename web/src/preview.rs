@@ -18,8 +18,6 @@ use crate::time_line::{Stand, TimeLine};
 const STEP_MICROS: f64 = 20_000.0;
 /// The time line has ten moments a second.
 const STEPS_BETWEEN_STANDS: u32 = 5;
-/// A client knows an arm after its second round of reads.
-const ROUNDS_TO_KNOW: u64 = 2;
 /// After five minutes of a program its preview ends.
 const MOST_STEPS: u32 = 15_000;
 /// A new arm has engaged its joints after two seconds.
@@ -58,10 +56,9 @@ impl Preview {
         // What the arm has sent before is for the page.
         drop(arm.receive());
         for _ in 0..STEPS_TO_START {
-            if client.rounds() >= ROUNDS_TO_KNOW {
-                break;
+            if !client.is_connected() {
+                pass(&mut client, &mut arm, 1);
             }
-            pass(&mut client, &mut arm, 1);
         }
         Self::begin(client, arm, program)
     }
@@ -132,14 +129,16 @@ impl Preview {
     }
 }
 
-/// Lets virtual time pass.
 fn pass(client: &mut Client, arm: &mut SimulatedSource, steps: u32) {
-    for _ in 0..steps {
-        arm.send(&client.poll(arm.now()));
-        arm.advance(STEP_MICROS, || true);
-        let bytes = arm.receive();
-        client.receive(arm.now(), &bytes);
-    }
+    (0..steps).for_each(|_| exchange(client, arm, STEP_MICROS));
+}
+
+/// Sends what is due, lets this virtual time pass, and takes what the arm has sent.
+pub(crate) fn exchange(client: &mut Client, arm: &mut SimulatedSource, micros: f64) {
+    arm.send(&client.poll(arm.now()));
+    arm.advance(micros, || true);
+    let bytes = arm.receive();
+    client.receive(arm.now(), &bytes);
 }
 
 #[cfg(test)]

@@ -8,8 +8,8 @@ use sevenbot::map::{SPEED, TIME};
 
 use crate::client::Client;
 use crate::exercise::observation;
+use crate::preview::exchange;
 use crate::program::{Pace, ProgramProgress, ProgramRun};
-use crate::source::Source;
 use crate::source::simulator::SimulatedSource;
 
 /// A picture of the page is shown each 1/60 s.
@@ -32,12 +32,7 @@ impl Tab {
 
     /// As the page does for each picture.
     pub(crate) fn pass(&mut self, pictures: u32) {
-        for _ in 0..pictures {
-            self.arm.send(&self.client.poll(self.now()));
-            self.arm.advance(PICTURE_MICROS, || true);
-            let bytes = self.arm.receive();
-            self.client.receive(self.now(), &bytes);
-        }
+        (0..pictures).for_each(|_| exchange(&mut self.client, &mut self.arm, PICTURE_MICROS));
     }
 
     pub(crate) fn now(&self) -> Instant {

@@ -384,11 +384,7 @@ const TEXTS: &[(&str, &str, &str)] = &[
         "A preview begins with an arm that stands. Wait until it does, or stop it.",
         "预演要从静止的机械臂开始。请等它停下，或先停止它。",
     ),
-    (
-        "preview-missing",
-        "There is no preview while a joint does not answer: the program would end there.",
-        "有关节没有应答时无法预演：程序也会在那里结束。",
-    ),
+    ("preview-missing", "There is no preview while a joint does not answer.", "有关节没有应答时无法预演。"),
     (
         "preview-elsewhere",
         "There is no preview: the simulated arm cannot stand as this arm does.",

@@ -62,7 +62,8 @@ pub enum MoveError {
         away: Vec<(Joint, u8, u8)>,
         /// The joints whose servo does not answer; bit 0 is joint 1.
         missing: u8,
-        /// The joints that have another target by now; bit 0 is joint 1.
+        /// The joints that have another target by now; bit 0 is joint 1. Another program wrote it, or the arm did, when a servo
+        /// answered again elsewhere ([D12](protocol_core::decisions#d12)).
         retargeted: u8,
     },
     /// The arm was told to hold, and has other targets since.
@@ -155,7 +156,9 @@ fn away_text(away: &[(Joint, u8, u8)]) -> String {
 fn retargeted_text(retargeted: u8) -> String {
     match retargeted {
         0 => String::new(),
-        bits => format!("; another program has stopped or moved {} meanwhile", joints(bits)),
+        bits => {
+            format!("; a stop, another program or a fault of a servo gave {} another target", joints(bits))
+        }
     }
 }
 

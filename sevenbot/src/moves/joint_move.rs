@@ -197,7 +197,7 @@ impl JointMove {
         // count as moving.
         let away = self.away(&positions(arm)?, ARRIVED_DEGREES, state);
         let is_due = self.elapsed(arm) >= self.duration();
-        Ok(if is_due { 0 } else { away.iter().fold(0, |bits, (joint, ..)| bits | joint.bit()) })
+        Ok(if is_due { 0 } else { bits(away.iter().map(|(joint, ..)| *joint)) })
     }
 
     /// Waits until the joints have settled. Fails if one has not reached its target.
@@ -245,7 +245,7 @@ impl JointMove {
         let known = arm.driven_joints().and_then(|joints| {
             let missing = arm.status()?.map_or(0, |status| status.missing());
             let retargeted = self.goals().filter(|(joint, goal)| joints.target(*joint) != *goal);
-            Ok((missing, retargeted.fold(0, |bits, (joint, _)| bits | joint.bit())))
+            Ok((missing, bits(retargeted.map(|(joint, _)| joint))))
         });
         match known {
             Ok((missing, retargeted)) => MoveError::NotReached { away, missing, retargeted },
@@ -286,7 +286,12 @@ impl JointMove {
 /// The joints with a target, as [`Joint::bit`]s.
 fn joints_of(targets: &Targets) -> u8 {
     let joints = Joint::ALL.into_iter().zip(targets).filter(|(_, goal)| goal.is_some());
-    joints.fold(0, |bits, (joint, _)| bits | joint.bit())
+    bits(joints.map(|(joint, _)| joint))
+}
+
+/// These joints, as [`Joint::bit`]s.
+fn bits(joints: impl Iterator<Item = Joint>) -> u8 {
+    joints.fold(0, |bits, joint| bits | joint.bit())
 }
 
 /// Waits for the time between two reads.

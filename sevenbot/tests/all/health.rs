@@ -146,10 +146,10 @@ fn d27_a_wait_ends_when_its_joint_is_blocked() {
 }
 
 #[test]
-fn a_wait_tells_that_another_program_has_stopped_the_arm() {
+fn a_wait_tells_that_a_joint_got_another_target() {
     let base_only = [Some(150), None, None, None, None, None, None];
-    for (stopped, words) in [(true, "; another program has stopped or moved joint 1 meanwhile"), (false, "")]
-    {
+    let told = "; a stop, another program or a fault of a servo gave joint 1 another target";
+    for (stopped, words) in [(true, told), (false, "")] {
         let (mut arm, registers, _held) = arm();
         let sent = JointMove::begin(&mut arm, base_only).unwrap();
         if stopped {

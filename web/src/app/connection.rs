@@ -65,31 +65,34 @@ impl App {
         if std::mem::replace(&mut self.is_end_told, true) {
             return;
         }
-        // A class tells by itself what becomes of its arm.
-        if self.class.is_some() {
-            return;
-        }
-        let text = match (self.client.rounds(), self.dom.choice("source") == "server") {
-            (0, true) => "no-server",
-            (_, true) => "server-ended",
-            (_, false) => "closed",
+        let text = match (self.dom.choice("source") == "server", self.client.rounds()) {
+            // A class tells by itself what becomes of its arm.
+            (true, _) if self.class.is_some() => return,
+            (true, 0) => "no-server",
+            (true, _) => "server-ended",
+            (false, _) => "closed",
         };
         self.dom.notice(format!("{} {reason}", self.language.text(text)).trim_end());
     }
 
-    /// True if nothing that this page writes reaches the arm. A person who tries is told.
+    /// True if nothing that this page writes reaches the arm.
     pub(super) fn only_watches(&self) -> bool {
-        if self.is_watching {
+        SharingState::of(self.client.registers()).is_some_and(|sharing| sharing.is_read_only)
+    }
+
+    /// As [`Self::only_watches`], for a person who wants to move or stop the arm.
+    pub(super) fn refuses_to_drive(&self) -> bool {
+        let only_watches = self.only_watches();
+        if only_watches {
             self.dom.notice(self.language.text("watch-only"));
         }
-        self.is_watching
+        only_watches
     }
 
     /// Switches the controls off while the server lets nobody write.
     pub(super) fn show_watching(&mut self) {
-        let sharing = SharingState::of(self.client.registers());
-        let is_watching = sharing.is_some_and(|sharing| sharing.is_read_only);
-        if !is_watching && !self.is_watching {
+        let is_watching = self.only_watches();
+        if !is_watching && !self.are_controls_off {
             return;
         }
         // The table of registers gets more of them.
@@ -100,6 +103,6 @@ impl App {
                 let _ = control.remove_attribute("disabled");
             }
         }
-        self.is_watching = is_watching;
+        self.are_controls_off = is_watching;
     }
 }

@@ -97,7 +97,7 @@ impl App {
     }
 
     pub(super) fn write(&mut self, address: u8, values: &[u8]) {
-        if self.only_watches() {
+        if self.refuses_to_drive() {
             return;
         }
         self.park = None;
@@ -175,7 +175,7 @@ impl App {
     }
 
     pub(super) fn stop(&mut self) {
-        if self.only_watches() {
+        if self.refuses_to_drive() {
             return;
         }
         let now = self.now();

@@ -64,7 +64,7 @@ pub(super) struct App {
     /// A person knows that the connection has ended.
     pub(super) is_end_told: bool,
     /// The controls are switched off, because the server lets nobody write.
-    pub(super) is_watching: bool,
+    pub(super) are_controls_off: bool,
     /// `None` where the browser has no WebGL2.
     pub(super) scene: Option<Scene>,
     pub(super) plot: CanvasRenderingContext2d,
@@ -179,7 +179,7 @@ impl App {
             line: Line::Simulated(Box::default()),
             client: Client::default(),
             is_end_told: false,
-            is_watching: false,
+            are_controls_off: false,
             scene: scene.ok(),
             plot,
             history: History::new(PLOT_SECONDS),

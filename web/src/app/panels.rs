@@ -139,7 +139,7 @@ fn show_line(app: &mut App, state: &ArmState) {
         _ => None,
     };
     let (line, mood) = state_line(app.language, answers, state, (app.client.stop_progress(), doing));
-    let watching = if app.is_watching { app.language.text("watch-only") } else { "" };
+    let watching = if app.only_watches() { app.language.text("watch-only") } else { "" };
     app.dom.set_text("state", format!("{line} {watching}").trim_end());
     if let Some(element) = app.dom.element("state") {
         set_attribute(&element, "class", mood.class());

@@ -77,6 +77,7 @@ mod tests {
     use crate::arm_state::target_frame;
     use crate::client::Client;
     use crate::movement::{PlayFailure, PlayProgress, Player};
+    use crate::preview::exchange;
     use crate::stop::StopProgress;
     use sevenbot::map::{SET_POINT_PERIOD, SPEED, WATCHDOG_ACTION};
     use sevenbot::{Joint, Problem, ProblemKind};
@@ -90,12 +91,7 @@ mod tests {
     }
 
     fn pass(client: &mut Client, arm: &mut SimulatedSource, frames: u32) {
-        for _ in 0..frames {
-            arm.send(&client.poll(arm.now()));
-            arm.advance(16_667.0, || true);
-            let bytes = arm.receive();
-            client.receive(arm.now(), &bytes);
-        }
+        (0..frames).for_each(|_| exchange(client, arm, 16_667.0));
     }
 
     /// As [`pass`], but nothing that the arm sends gets through.

@@ -2,6 +2,7 @@
 
 mod class;
 mod controls;
+mod editor;
 mod endurance;
 mod exercises;
 mod faults;
