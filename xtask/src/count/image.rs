@@ -24,7 +24,7 @@ const SERVO_DATA: u64 = 0x4000_4404;
 /// The largest number of requests for one count.
 const TRIES: usize = 400;
 /// The sufficient number of undisturbed requests.
-const SAMPLES: usize = 48;
+const SAMPLES: usize = 24;
 /// The time of a log of the moving arm: about forty control cycles.
 const WATCH_TIME: Duration = Duration::from_secs(4);
 /// The largest number of logs. A busy machine may show few control cycles in one log.
@@ -329,9 +329,9 @@ fn send_and_watch(
 ) -> TaskResult<Vec<TraceEvent>> {
     let bytes = frame(request);
     let (before, rest) = bytes.split_at(bytes.len() - from_last);
-    let (byte, after) = rest.split_at(1);
+    let (byte, after) = rest.split_first().ok_or("the request has fewer bytes")?;
     machine.send(before)?;
-    let events = machine.watch(|machine| machine.send(byte))?;
+    let events = machine.watch_byte(*byte)?;
     machine.send(after)?;
     // On a busy machine the pause may be too long (D4), so that there is no reply. The caller tries again.
     machine.settle()?;

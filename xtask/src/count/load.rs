@@ -27,7 +27,7 @@ const REPORT_HZ: u8 = 50;
 const CONTENT: u8 = 2;
 const REPORT_BYTES: usize = 49;
 /// When start-up and the first frames are over, and the end of the count, in milliseconds.
-const START_MILLIS: u64 = 1_500;
+const START_MILLIS: u64 = 1_000;
 const END_MILLIS: u64 = START_MILLIS + 1_000;
 /// 90 degrees in hundredths.
 const MIDDLE: u16 = 9_000;

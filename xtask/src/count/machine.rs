@@ -19,6 +19,8 @@ use emulator::monitor::{self, Monitor};
 
 /// The time after which the arm has processed a request and sleeps.
 const IDLE_TIME: Duration = Duration::from_millis(20);
+/// The time after which the arm has processed a byte and sleeps, as a rule. What is logged costs time.
+const BYTE_TIME: Duration = Duration::from_millis(5);
 
 /// The arm in the emulator.
 pub(crate) struct Machine {
@@ -73,6 +75,15 @@ impl Machine {
         self.host.write_all(bytes)?;
         sleep(IDLE_TIME);
         Ok(())
+    }
+
+    /// Sends a byte to the arm, and logs what it does then. On a busy machine the log may end before the arm sleeps.
+    pub(crate) fn watch_byte(&mut self, byte: u8) -> TaskResult<Vec<TraceEvent>> {
+        self.watch(|machine| {
+            machine.host.write_all(&[byte])?;
+            sleep(BYTE_TIME);
+            Ok(())
+        })
     }
 
     /// Waits for a reply with this many values.
