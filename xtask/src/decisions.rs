@@ -14,7 +14,7 @@ use crate::run::{TaskResult, root};
 /// The letter and the number of a decision.
 type Decision = (char, u8);
 
-/// The decisions about the arm. D30 is about the programs of the host, and `docs/protocol.md` has no M11.
+/// The decisions about the arm. D30 and M11 are about the programs of the host.
 fn all_decisions() -> impl Iterator<Item = Decision> {
     let of_map22 = (1..=29).map(|number| ('D', number));
     of_map22.chain((1..=10).chain([12]).map(|number| ('M', number)))
