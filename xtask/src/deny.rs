@@ -12,6 +12,7 @@ use serde::Deserialize;
 use spdx::{Expression, LicenseReq};
 
 use crate::run::{TaskResult, cargo, root};
+use crate::workspace::{Dependency, Package, metadata};
 
 /// The workspaces whose dependencies are checked.
 const MANIFESTS: [&str; 2] = ["Cargo.toml", "verification/fuzz/Cargo.toml"];
@@ -83,29 +84,6 @@ enum Deny {
     Deny,
 }
 
-/// The part of the output of `cargo metadata` that is read here.
-#[derive(Deserialize)]
-struct PackageList {
-    packages: Vec<CheckedPackage>,
-}
-
-#[derive(Clone, Deserialize)]
-struct CheckedPackage {
-    name: String,
-    version: String,
-    license: Option<String>,
-    /// `None` for a package of this repository.
-    source: Option<String>,
-    dependencies: Vec<CheckedDependency>,
-}
-
-#[derive(Clone, Deserialize)]
-struct CheckedDependency {
-    name: String,
-    req: String,
-    path: Option<String>,
-}
-
 /// Checks licences, versions and sources.
 pub(crate) fn rules() -> TaskResult {
     let rules: DenyRules = toml::from_str(&fs::read_to_string(root().join("deny.toml"))?)?;
@@ -140,35 +118,29 @@ fn succeeds(words: &str) -> bool {
 }
 
 /// The packages in the builds for all targets, each version once, with our own.
-fn packages(graph: &Graph) -> TaskResult<Vec<CheckedPackage>> {
+fn packages(graph: &Graph) -> TaskResult<Vec<Package>> {
     let mut found = BTreeMap::new();
     for manifest in MANIFESTS {
         for target in &graph.targets {
-            let mut cargo = Command::new("cargo");
-            cargo.args(["metadata", "--format-version", "1", "--manifest-path", manifest]);
-            cargo.args(["--filter-platform", target]).args(graph.all_features.then_some("--all-features"));
-            let output = cargo.current_dir(root()).stderr(Stdio::inherit()).output()?;
-            if !output.status.success() {
-                Err(format!("`cargo metadata` failed for {manifest} and {target}"))?;
-            }
-            let metadata: PackageList = serde_json::from_slice(&output.stdout)?;
-            let named = |package: CheckedPackage| ((package.name.clone(), package.version.clone()), package);
-            found.extend(metadata.packages.into_iter().map(named));
+            let mut arguments = vec!["--manifest-path", manifest, "--filter-platform", target];
+            arguments.extend(graph.all_features.then_some("--all-features"));
+            let named = |package: Package| ((package.name.clone(), package.version.clone()), package);
+            found.extend(metadata(&arguments)?.packages.into_iter().map(named));
         }
     }
     Ok(found.into_values().collect())
 }
 
 /// Names with more than one version.
-fn duplicates(packages: &[CheckedPackage]) -> BTreeSet<&str> {
+fn duplicates(packages: &[Package]) -> BTreeSet<&str> {
     let mut seen = BTreeSet::new();
     packages.iter().map(|package| package.name.as_str()).filter(|name| !seen.insert(*name)).collect()
 }
 
 impl DenyRules {
     /// The violations of the rules, one line each.
-    fn violations(&self, packages: &[CheckedPackage]) -> Vec<String> {
-        let of_package = |package: &CheckedPackage| {
+    fn violations(&self, packages: &[Package]) -> Vec<String> {
+        let of_package = |package: &Package| {
             let violations = [self.license(package), self.source(package), self.wildcard(package)];
             let name = format!("{} {}", package.name, package.version);
             violations.into_iter().flatten().map(move |violation| format!("{name}: {violation}"))
@@ -180,7 +152,7 @@ impl DenyRules {
     }
 
     /// A licence is allowed for all crates or for this one.
-    fn license(&self, package: &CheckedPackage) -> Option<String> {
+    fn license(&self, package: &Package) -> Option<String> {
         let Some(license) = &package.license else {
             return Some("has no licence".to_owned());
         };
@@ -195,7 +167,7 @@ impl DenyRules {
     }
 
     /// A dependency comes from an allowed registry, never from a git repository.
-    fn source(&self, package: &CheckedPackage) -> Option<String> {
+    fn source(&self, package: &Package) -> Option<String> {
         let source = package.source.as_ref()?;
         let registry = source.strip_prefix("registry+").or_else(|| source.strip_prefix("sparse+"));
         let is_allowed = registry
@@ -204,9 +176,9 @@ impl DenyRules {
     }
 
     /// Our packages do not depend on any version of a crate.
-    fn wildcard(&self, package: &CheckedPackage) -> Option<String> {
+    fn wildcard(&self, package: &Package) -> Option<String> {
         let is_exempt =
-            |dependency: &&CheckedDependency| dependency.path.is_some() && self.bans.allow_wildcard_paths;
+            |dependency: &&Dependency| dependency.path.is_some() && self.bans.allow_wildcard_paths;
         let mut wild = package.dependencies.iter().filter(|dependency| dependency.req == "*");
         let violation = wild.find(|dependency| package.source.is_none() && !is_exempt(dependency))?;
         Some(format!("takes any version of {}", violation.name))
@@ -224,13 +196,13 @@ mod tests {
         toml::from_str(&fs::read_to_string(root().join("deny.toml")).unwrap()).unwrap()
     }
 
-    fn package(license: Option<&str>, source: Option<&str>) -> CheckedPackage {
-        CheckedPackage {
+    fn package(license: Option<&str>, source: Option<&str>) -> Package {
+        Package {
             name: "example".to_owned(),
             version: "1.0.0".to_owned(),
             license: license.map(str::to_owned),
             source: source.map(str::to_owned),
-            dependencies: Vec::new(),
+            ..Package::default()
         }
     }
 
@@ -274,8 +246,8 @@ mod tests {
     fn a_dependency_on_any_version_is_refused_unless_it_is_a_folder() {
         let rules = rules();
         let mut ours = package(Some("MIT"), None);
-        let any = CheckedDependency { name: "any".to_owned(), req: "*".to_owned(), path: None };
-        ours.dependencies = vec![CheckedDependency { path: Some("any".to_owned()), ..any.clone() }];
+        let any = Dependency { name: "any".to_owned(), req: "*".to_owned(), ..Dependency::default() };
+        ours.dependencies = vec![Dependency { path: Some("any".into()), ..any.clone() }];
         assert_eq!(rules.wildcard(&ours), None);
         ours.dependencies.push(any);
         assert!(rules.wildcard(&ours).is_some());

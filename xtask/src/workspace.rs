@@ -10,44 +10,81 @@ use crate::run::{TaskResult, root};
 
 /// The part of the metadata that is read here.
 #[derive(Deserialize)]
-struct Metadata {
-    packages: Vec<Package>,
+pub(crate) struct Metadata {
+    pub(crate) packages: Vec<Package>,
+    /// What is built for what. `None` with `--no-deps`.
+    pub(crate) resolve: Option<Resolve>,
 }
 
 /// A crate.
-#[derive(Deserialize)]
+#[derive(Clone, Default, Deserialize)]
 pub(crate) struct Package {
-    /// Its name.
+    pub(crate) id: String,
     pub(crate) name: String,
-    manifest_path: PathBuf,
-    targets: Vec<CrateTarget>,
-    dependencies: Vec<Dependency>,
+    pub(crate) version: String,
+    pub(crate) license: Option<String>,
+    /// `None` for a package of this repository.
+    pub(crate) source: Option<String>,
+    pub(crate) manifest_path: PathBuf,
+    pub(crate) targets: Vec<CrateTarget>,
+    pub(crate) dependencies: Vec<Dependency>,
 }
 
-#[derive(Deserialize)]
-struct CrateTarget {
+#[derive(Clone, Deserialize)]
+pub(crate) struct CrateTarget {
     kind: Vec<String>,
     src_path: PathBuf,
 }
 
+/// A dependency, as a manifest names it.
+#[derive(Clone, Default, Deserialize)]
+pub(crate) struct Dependency {
+    pub(crate) name: String,
+    /// The versions that it may have.
+    pub(crate) req: String,
+    /// `dev`, `build`, or `None` for a normal dependency.
+    pub(crate) kind: Option<String>,
+    /// The folder, if the dependency is a crate of the workspace.
+    pub(crate) path: Option<PathBuf>,
+}
+
 #[derive(Deserialize)]
-struct Dependency {
-    name: String,
+pub(crate) struct Resolve {
+    nodes: Vec<Node>,
+}
+
+#[derive(Deserialize)]
+struct Node {
+    id: String,
+    deps: Vec<NodeDependency>,
+}
+
+#[derive(Deserialize)]
+struct NodeDependency {
+    pkg: String,
+    dep_kinds: Vec<DependencyKind>,
+}
+
+#[derive(Deserialize)]
+struct DependencyKind {
     /// `dev`, `build`, or `None` for a normal dependency.
     kind: Option<String>,
-    /// The folder, if the dependency is a crate of the workspace.
-    path: Option<PathBuf>,
+}
+
+/// What `cargo metadata` reports with these arguments.
+pub(crate) fn metadata(arguments: &[&str]) -> TaskResult<Metadata> {
+    let mut cargo = Command::new("cargo");
+    cargo.args(["metadata", "--format-version", "1"]).args(arguments).current_dir(root());
+    let output = cargo.stderr(Stdio::inherit()).output()?;
+    if !output.status.success() {
+        Err(format!("`cargo metadata {}` failed", arguments.join(" ")))?;
+    }
+    Ok(serde_json::from_slice(&output.stdout)?)
 }
 
 /// The crates of the workspace, in the order of their names.
 pub(crate) fn packages() -> TaskResult<Vec<Package>> {
-    let mut cargo = Command::new("cargo");
-    cargo.args(["metadata", "--no-deps", "--format-version", "1"]).current_dir(root());
-    let output = cargo.stderr(Stdio::inherit()).output()?;
-    if !output.status.success() {
-        Err("`cargo metadata` failed")?;
-    }
-    let mut packages = serde_json::from_slice::<Metadata>(&output.stdout)?.packages;
+    let mut packages = metadata(&["--no-deps"])?.packages;
     packages.sort_by(|one, other| one.name.cmp(&other.name));
     Ok(packages)
 }
@@ -70,5 +107,19 @@ impl Package {
     pub(crate) fn uses(&self) -> BTreeSet<&str> {
         let is_normal = |dependency: &&Dependency| dependency.kind.is_none() && dependency.path.is_some();
         self.dependencies.iter().filter(is_normal).map(|dependency| dependency.name.as_str()).collect()
+    }
+}
+
+impl Resolve {
+    /// The ids of these packages, and of all that they contain, without what only builds or tests them.
+    pub(crate) fn parts<'a>(&'a self, mut open: Vec<&'a str>) -> BTreeSet<&'a str> {
+        let mut found = BTreeSet::new();
+        while let Some(id) = open.pop() {
+            let node = self.nodes.iter().find(|node| node.id == id);
+            let Some(node) = node.filter(|_| found.insert(id)) else { continue };
+            let is_part = |on: &&NodeDependency| on.dep_kinds.iter().any(|kind| kind.kind.is_none());
+            open.extend(node.deps.iter().filter(is_part).map(|on| on.pkg.as_str()));
+        }
+        found
     }
 }

@@ -1,15 +1,13 @@
 //! The licences of all crates that are part of a release, with the texts that their packages hold.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
-
-use serde::Deserialize;
 
 use crate::blockly;
-use crate::run::{TaskResult, root};
+use crate::run::TaskResult;
+use crate::workspace::{Metadata, Package, metadata};
 
 /// The packages whose programs, module, page and image are released.
 const RELEASED: [&str; 5] = ["firmware-stm32", "host-sim", "sevenbot-cli", "sevenbot-python", "sevenbot-web"];
@@ -18,53 +16,14 @@ const LICENCE_FILES: [&str; 6] = ["copying", "copyright", "licence", "license", 
 /// Between two parts of the text.
 const RULE: &str = "\n================================================================================\n";
 
-/// The part of the output of `cargo metadata` that is read here.
-#[derive(Deserialize)]
-struct Metadata {
-    packages: Vec<Package>,
-    resolve: Resolve,
-}
-
-#[derive(Deserialize)]
-struct Package {
-    id: String,
-    name: String,
-    version: String,
-    license: Option<String>,
-    /// `None` for a package of this repository.
-    source: Option<String>,
-    manifest_path: PathBuf,
-}
-
-#[derive(Deserialize)]
-struct Resolve {
-    nodes: Vec<Node>,
-}
-
-#[derive(Deserialize)]
-struct Node {
-    id: String,
-    deps: Vec<NodeDependency>,
-}
-
-#[derive(Deserialize)]
-struct NodeDependency {
-    pkg: String,
-    dep_kinds: Vec<DependencyKind>,
-}
-
-#[derive(Deserialize)]
-struct DependencyKind {
-    /// `dev`, `build`, or `None` for a normal dependency.
-    kind: Option<String>,
-}
-
 /// The list of all crates, and each text once.
 pub(super) fn text() -> TaskResult<String> {
-    let metadata = metadata()?;
-    let part = metadata.released();
-    let mut crates: Vec<_> = metadata
-        .packages
+    let Metadata { packages, resolve } = metadata(&["--locked"])?;
+    let is_released = |package: &&Package| RELEASED.contains(&package.name.as_str());
+    let released = packages.iter().filter(is_released).map(|package| package.id.as_str()).collect();
+    let resolve = resolve.ok_or("`cargo metadata` does not say what is built for what")?;
+    let part = resolve.parts(released);
+    let mut crates: Vec<_> = packages
         .iter()
         .filter(|package| package.source.is_some() && part.contains(package.id.as_str()))
         .collect();
@@ -77,7 +36,7 @@ pub(super) fn text() -> TaskResult<String> {
     for package in crates {
         let name = format!("{} {}", package.name, package.version);
         writeln!(text, "{name}: {}", package.license.as_deref().unwrap_or("see its text"))?;
-        for licence in package.texts()? {
+        for licence in texts(package)? {
             licences.entry(licence).or_default().push(name.clone());
         }
     }
@@ -91,46 +50,14 @@ pub(super) fn text() -> TaskResult<String> {
     Ok(text)
 }
 
-fn metadata() -> TaskResult<Metadata> {
-    let mut cargo = Command::new("cargo");
-    cargo
-        .args(["metadata", "--locked", "--format-version", "1"])
-        .current_dir(root())
-        .stderr(Stdio::inherit());
-    let output = cargo.output()?;
-    if !output.status.success() {
-        return Err("`cargo metadata` failed".into());
-    }
-    Ok(serde_json::from_slice(&output.stdout)?)
-}
-
-impl Metadata {
-    /// The packages that are part of what is released, without what only builds or tests it.
-    fn released(&self) -> BTreeSet<&str> {
-        let nodes: BTreeMap<_, _> = self.resolve.nodes.iter().map(|node| (node.id.as_str(), node)).collect();
-        let is_root = |package: &&Package| RELEASED.contains(&package.name.as_str());
-        let mut open: Vec<&str> =
-            self.packages.iter().filter(is_root).map(|package| package.id.as_str()).collect();
-        let mut found = BTreeSet::new();
-        while let Some(id) = open.pop() {
-            let Some(node) = nodes.get(id).filter(|_| found.insert(id)) else { continue };
-            let is_part = |on: &&NodeDependency| on.dep_kinds.iter().any(|kind| kind.kind.is_none());
-            open.extend(node.deps.iter().filter(is_part).map(|on| on.pkg.as_str()));
-        }
-        found
-    }
-}
-
-impl Package {
-    /// The texts of the licences that the package holds.
-    fn texts(&self) -> TaskResult<Vec<String>> {
-        let folder = self.manifest_path.parent().unwrap_or(Path::new(""));
-        let mut paths: Vec<_> = fs::read_dir(folder)?.flatten().map(|entry| entry.path()).collect();
-        paths.retain(|path| path.is_file() && is_licence(path));
-        paths.sort();
-        let text = |path: &PathBuf| Ok(String::from_utf8_lossy(&fs::read(path)?).replace("\r\n", "\n"));
-        paths.iter().map(text).collect()
-    }
+/// The texts of the licences that a package holds.
+fn texts(package: &Package) -> TaskResult<Vec<String>> {
+    let folder = package.manifest_path.parent().unwrap_or(Path::new(""));
+    let mut paths: Vec<_> = fs::read_dir(folder)?.flatten().map(|entry| entry.path()).collect();
+    paths.retain(|path| path.is_file() && is_licence(path));
+    paths.sort();
+    let text = |path: &PathBuf| Ok(String::from_utf8_lossy(&fs::read(path)?).replace("\r\n", "\n"));
+    paths.iter().map(text).collect()
 }
 
 fn is_licence(path: &Path) -> bool {
