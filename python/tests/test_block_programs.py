@@ -12,7 +12,7 @@ import runpy
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import pytest
@@ -25,13 +25,22 @@ PROGRAMS = os.environ.get("SEVENBOT_PROGRAMS")
 TOLERANCE = 0.5
 #: Seconds. No test fails because a machine is slow.
 ENOUGH = 120.0
-#: Seconds. On a busy machine an answer of the emulator takes longer than a program waits by itself.
+#: Seconds. On a busy machine an answer of the emulator may take longer than a program waits by itself.
 ANSWER_TIME = 20.0
 
 
 def end_of(program: Path) -> list[float]:
     """Where the arm of the page ends."""
     return [float(word) for word in program.with_suffix(".end.txt").read_text().split()]
+
+
+def run_here(
+    program: Path, arm: Callable[..., object], monkeypatch: pytest.MonkeyPatch, arguments: Sequence[str] = ()
+) -> None:
+    """Runs a program in this process. `arm` stands for `sevenbot.Arm`."""
+    monkeypatch.setattr(sevenbot, "Arm", arm)
+    monkeypatch.setattr(sys, "argv", [str(program), *arguments])
+    runpy.run_path(str(program))
 
 
 each_program = pytest.mark.parametrize("program", sorted(EXAMPLES.glob("*.py")), ids=lambda path: path.stem)
@@ -41,9 +50,7 @@ each_program = pytest.mark.parametrize("program", sorted(EXAMPLES.glob("*.py")),
 def test_a_program_ends_where_it_does_in_the_page(
     program: Path, simulated_arm: sevenbot.SimulatedArm, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(sevenbot, "Arm", lambda: contextlib.nullcontext(simulated_arm))
-    monkeypatch.setattr(sys, "argv", [str(program)])
-    runpy.run_path(str(program))
+    run_here(program, lambda: contextlib.nullcontext(simulated_arm), monkeypatch)
     simulated_arm.sleep(0.5)
     assert list(simulated_arm.simulation.angles) == pytest.approx(end_of(program), abs=TOLERANCE)
 
@@ -87,8 +94,7 @@ def test_a_program_runs_unchanged_with_the_name_of_a_port(tmp_path: Path) -> Non
 def test_a_program_ends_on_the_image_for_the_arm_where_it_does_in_the_page(
     program: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(sevenbot, "Arm", functools.partial(sevenbot.Arm, timeout=ANSWER_TIME))
+    patient_arm = functools.partial(sevenbot.Arm, timeout=ANSWER_TIME)
     with started([f"{PROGRAMS}/xtask", "emulate", "--no-build"], tmp_path / "arm") as link:
-        monkeypatch.setattr(sys, "argv", [str(program), str(link)])
-        runpy.run_path(str(program))
+        run_here(program, patient_arm, monkeypatch, [str(link)])
         assert_at_end(program, link)

@@ -12,7 +12,7 @@ use crate::run::{TaskResult, root};
 #[derive(Deserialize)]
 pub(crate) struct Metadata {
     pub(crate) packages: Vec<Package>,
-    /// What is built for what. `None` with `--no-deps`.
+    /// Which packages each package uses. `None` with `--no-deps`.
     pub(crate) resolve: Option<Resolve>,
 }
 
@@ -48,6 +48,7 @@ pub(crate) struct Dependency {
     pub(crate) path: Option<PathBuf>,
 }
 
+/// Which packages each package uses.
 #[derive(Deserialize)]
 pub(crate) struct Resolve {
     nodes: Vec<Node>,

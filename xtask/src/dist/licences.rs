@@ -21,7 +21,7 @@ pub(super) fn text() -> TaskResult<String> {
     let Metadata { packages, resolve } = metadata(&["--locked"])?;
     let is_released = |package: &&Package| RELEASED.contains(&package.name.as_str());
     let released = packages.iter().filter(is_released).map(|package| package.id.as_str()).collect();
-    let resolve = resolve.ok_or("`cargo metadata` does not say what is built for what")?;
+    let resolve = resolve.ok_or("`cargo metadata` does not say which packages each package uses")?;
     let part = resolve.parts(released);
     let mut crates: Vec<_> = packages
         .iter()
