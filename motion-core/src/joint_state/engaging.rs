@@ -10,7 +10,7 @@ use crate::calibration::{MicroDegrees, angle_from_counts, counts_from_angle};
 use crate::drive::{Target, is_near};
 use crate::obstacle::Obstacle;
 use crate::servo_bus::Answer;
-use crate::torque_check::TorqueCheck;
+use crate::torque_check::{TorqueCheck, TorqueFound};
 
 impl JointState {
     /// Checks the goal that the servo of a joint shows whose torque is pending ([D12](protocol_core::decisions#d12)).
@@ -25,8 +25,11 @@ impl JointState {
     ) -> Option<u8> {
         let held = answer.torque?;
         if !held.is_on && self.goal.had_torque() {
-            // The servo restarted since it was read on (D29).
-            self.lose_torque(now);
+            // The servo restarted since it was read on (D29), if a second answer says so.
+            self.torque.doubt();
+            if self.torque.answered(Some(false)) == TorqueFound::Lost {
+                self.lose_torque(now);
+            }
             return None;
         }
         if held.is_on && answer.alarms != 0 && answer.reading.load == 0 && !self.position.is_steady() {

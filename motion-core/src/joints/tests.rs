@@ -170,6 +170,28 @@ fn d29_a_joint_that_was_silent_before_it_had_torque_engages_after_any_time() {
     assert_eq!([3_000, 3_010].map(&mut measure), [Measured::Rejected, Measured::Engaged]);
 }
 
+/// One damaged answer in 256 passes its checksum.
+#[test]
+fn d29_two_answers_have_to_say_that_a_servo_restarted_while_its_torque_is_pending() {
+    for restarts in [false, true] {
+        let (mut joints, mut registers) = measured(MotorState::Servo);
+        joints.take_torque(true);
+        assert_eq!([20, 30, 40].map(|millis| joints.failed(at_ms(millis), J1)), [false, false, true]);
+        let mut read = |millis, is_on| {
+            let torque = Some(HeldGoal { is_on, goal_counts: 511 });
+            let outcome =
+                joints.measured(at_ms(millis), J1, &Answer { torque, ..answer(511) }, true, &mut registers);
+            let goals = joints.goals(at_ms(millis), &registers).count();
+            (outcome, goals, joints.joint(J1).unwrap().is_let_go())
+        };
+        assert_eq!(read(3_000, true), (Measured::Rejected, 0, false));
+        assert_eq!(read(3_010, true), (Measured::Engaged, 1, false));
+        assert_eq!(read(3_020, false), (Measured::Accepted, 0, false), "no goal while it is doubtful");
+        let expected = if restarts { Measured::Accepted } else { Measured::TorqueDue { goals: 1 } };
+        assert_eq!(read(3_030, !restarts), (expected, usize::from(!restarts), restarts));
+    }
+}
+
 #[test]
 fn d13_the_other_states_set_every_switch_and_drive_nothing() {
     for (state, torque) in [(MotorState::Damping, Torque::Damping), (MotorState::Forceless, Torque::Free)] {
