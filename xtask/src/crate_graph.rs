@@ -2,14 +2,12 @@
 
 use std::fmt::Write;
 
-use crate::generated::GeneratedSection;
+use crate::generated::{self, GeneratedFile};
 use crate::run::TaskResult;
 use crate::workspace::{self, Package};
 
-const SECTION: GeneratedSection = GeneratedSection {
-    document: "docs/design.md",
-    begin: "<!-- begin: made by `cargo xtask docs` from `cargo metadata` -->\n",
-};
+/// The line before the picture.
+const BEGIN: &str = "<!-- begin: made by `cargo xtask docs` from `cargo metadata` -->\n";
 
 /// A group of crates.
 type Group = (&'static str, &'static [&'static str]);
@@ -55,16 +53,9 @@ const GROUPS: [Group; 3] = [
     ("measurement", &["bench", "footprint", "peers"]),
 ];
 
-/// Draws the picture.
-pub(crate) fn write() -> TaskResult {
-    SECTION.write(&picture(&workspace::packages()?)?)
-}
-
-/// Fails if the picture is not the one that [`write()`] draws.
-pub(crate) fn check() -> TaskResult {
-    SECTION.check(&picture(&workspace::packages()?)?)?;
-    println!("docs/design.md shows the crates and their dependencies");
-    Ok(())
+/// The document with the picture.
+pub(crate) fn files() -> TaskResult<Vec<GeneratedFile>> {
+    generated::with_section("docs/design.md", BEGIN, &picture(&workspace::packages()?)?)
 }
 
 /// A flowchart in the language of Mermaid.

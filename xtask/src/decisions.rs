@@ -8,7 +8,7 @@ use std::fmt::Write;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::generated::GeneratedSection;
+use crate::generated::{self, GeneratedFile};
 use crate::run::{TaskResult, root};
 
 /// The letter and the number of a decision.
@@ -20,19 +20,12 @@ fn all_decisions() -> impl Iterator<Item = Decision> {
     of_map22.chain((1..=10).chain([12]).map(|number| ('M', number)))
 }
 
-const SECTION: GeneratedSection = GeneratedSection {
-    document: "docs/protocol.md",
-    begin: "<!-- begin: made by `cargo xtask docs` from the names of the tests -->\n",
-};
+/// The line before the table.
+const BEGIN: &str = "<!-- begin: made by `cargo xtask docs` from the names of the tests -->\n";
 
-/// Writes the table.
-pub(crate) fn write() -> TaskResult {
-    SECTION.write(&table()?)
-}
-
-/// Fails if the table is stale, or if a decision has no test.
-pub(crate) fn check() -> TaskResult {
-    SECTION.check(&table()?)
+/// The document with the table. Fails if a decision has no test.
+pub(crate) fn files() -> TaskResult<Vec<GeneratedFile>> {
+    generated::with_section("docs/protocol.md", BEGIN, &table()?)
 }
 
 fn table() -> TaskResult<String> {

@@ -1,45 +1,52 @@
-//! Generated sections of a document, between two marks.
+//! `cargo xtask docs`: files that are generated as a whole, and sections of documents, between two marks.
 
 use std::fs;
 
 use crate::run::{TaskResult, root};
+use crate::{crate_graph, decisions, registers_md, ros_model};
+
+/// The path of a file from the root of the workspace, and what it has to contain.
+pub(crate) type GeneratedFile = (String, Vec<u8>);
+
+const GENERATORS: [fn() -> TaskResult<Vec<GeneratedFile>>; 4] =
+    [registers_md::files, ros_model::files, decisions::files, crate_graph::files];
 
 /// The last line of every generated section.
 const END: &str = "<!-- end -->\n";
 
-/// A section of a document.
-pub(crate) struct GeneratedSection {
-    /// The document, from the root of the workspace.
-    pub(crate) document: &'static str,
-    /// The line before the section.
-    pub(crate) begin: &'static str,
+/// Writes all files.
+pub(crate) fn write() -> TaskResult {
+    for generate in GENERATORS {
+        generate()?.into_iter().try_for_each(|(path, content)| fs::write(root().join(path), content))?;
+    }
+    Ok(())
 }
 
-impl GeneratedSection {
-    /// Writes the section.
-    pub(crate) fn write(&self, content: &str) -> TaskResult {
-        let path = root().join(self.document);
-        let text = fs::read_to_string(&path)?;
-        Ok(fs::write(path, self.replace(&text, content)?)?)
-    }
-
-    /// Fails if the section has another content.
-    pub(crate) fn check(&self, content: &str) -> TaskResult {
-        let text = fs::read_to_string(root().join(self.document))?;
-        if self.replace(&text, content)? == text {
-            return Ok(());
+/// Fails if a file has another content.
+pub(crate) fn check() -> TaskResult {
+    for (path, content) in
+        GENERATORS.iter().map(|generate| generate()).collect::<TaskResult<Vec<_>>>()?.concat()
+    {
+        if fs::read(root().join(&path)).ok() != Some(content) {
+            Err(format!("{path} is out of date: run `cargo xtask docs`"))?;
         }
-        Err(format!("{} is out of date: run `cargo xtask docs`", self.document).into())
+        println!("{path} is up to date");
     }
+    Ok(())
+}
 
-    fn replace(&self, text: &str, content: &str) -> TaskResult<String> {
-        let Self { document, begin } = self;
-        let (before, rest) =
-            text.split_once(begin).ok_or_else(|| format!("{document} has no line {begin}"))?;
-        let (_, after) =
-            rest.split_once(END).ok_or_else(|| format!("{document} has no end after {begin}"))?;
-        Ok(format!("{before}{begin}{content}{END}{after}"))
-    }
+/// A document with another content of the section that begins after the line `begin`.
+pub(crate) fn with_section(document: &str, begin: &str, content: &str) -> TaskResult<Vec<GeneratedFile>> {
+    let text = fs::read_to_string(root().join(document))?;
+    let replaced =
+        replace(&text, begin, content).ok_or_else(|| format!("{document} has no section {begin}"))?;
+    Ok(vec![(document.to_owned(), replaced.into_bytes())])
+}
+
+fn replace(text: &str, begin: &str, content: &str) -> Option<String> {
+    let (before, rest) = text.split_once(begin)?;
+    let (_, after) = rest.split_once(END)?;
+    Some(format!("{before}{begin}{content}{END}{after}"))
 }
 
 #[cfg(test)]
@@ -48,11 +55,11 @@ mod tests {
 
     #[test]
     fn only_the_section_is_replaced() {
-        let section = GeneratedSection { document: "a.md", begin: "<!-- begin: b -->\n" };
+        let begin = "<!-- begin: b -->\n";
         let text = "before\n<!-- begin: b -->\nold\n<!-- end -->\nafter\n";
         let expected = "before\n<!-- begin: b -->\nnew\n<!-- end -->\nafter\n";
-        assert_eq!(section.replace(text, "new\n").unwrap(), expected);
-        assert!(section.replace("no marks", "new\n").is_err());
-        assert!(section.replace("<!-- begin: b -->\nno end", "new\n").is_err());
+        assert_eq!(replace(text, begin, "new\n").as_deref(), Some(expected));
+        assert_eq!(replace("no marks", begin, "new\n"), None);
+        assert_eq!(replace("<!-- begin: b -->\nno end", begin, "new\n"), None);
     }
 }

@@ -138,24 +138,11 @@ fn main() -> ExitCode {
     }
 }
 
-/// A generated document.
-struct Document {
-    write: fn() -> TaskResult,
-    check: fn() -> TaskResult,
-}
-
-const DOCUMENTS: [Document; 4] = [
-    Document { write: registers_md::write, check: registers_md::check },
-    Document { write: ros_model::write, check: ros_model::check },
-    Document { write: decisions::write, check: decisions::check },
-    Document { write: crate_graph::write, check: crate_graph::check },
-];
-
 fn run_task(task: &Task) -> TaskResult {
     match task {
         Task::Test(options) => test::run_steps(options),
-        Task::Docs { check: true } => DOCUMENTS.iter().try_for_each(|document| (document.check)()),
-        Task::Docs { check: false } => DOCUMENTS.iter().try_for_each(|document| (document.write)()),
+        Task::Docs { check: true } => generated::check(),
+        Task::Docs { check: false } => generated::write(),
         Task::Dist(options) => dist::run(options),
         Task::Modules => modules::check(),
         Task::Torture(options) => torture::run(options),

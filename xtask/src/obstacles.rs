@@ -6,46 +6,52 @@
 use std::error::Error;
 
 use arm_sim::plant::Plant;
+use emulator::emulated_arm::EmulatedArm;
+use emulator::need_qemu;
 use protocol_core::request::Request;
-use protocol_core::time::Instant;
+use protocol_core::time::{Duration, Instant};
 use torture::obstacles::{Experiments, ObstacleArm};
 
 use crate::run::{self, TaskResult};
-use crate::sag::{EmulatedArm, STEP};
-use emulator::need_qemu;
+
+/// A step of an experiment.
+const STEP: Duration = Duration::from_millis(1);
 
 /// Builds the image, makes the experiments and prints their tables.
 pub(crate) fn measure() -> TaskResult {
     need_qemu()?;
     run::build_image()?;
-    println!("{}", Experiments::few().measure::<EmulatedArm>()?);
+    println!("{}", Experiments::few().measure::<Arm>()?);
     Ok(())
 }
 
-impl ObstacleArm for EmulatedArm {
+/// The arm of the experiments.
+struct Arm(EmulatedArm);
+
+impl ObstacleArm for Arm {
     type Error = Box<dyn Error>;
 
     fn start() -> TaskResult<Self> {
-        Self::start()
+        EmulatedArm::start().map(Self)
     }
 
     fn now(&self) -> Instant {
-        self.now
+        self.0.now()
     }
 
     fn plant(&mut self) -> &mut Plant {
-        &mut self.plant
+        &mut self.0.plant
     }
 
     fn write(&mut self, address: u8, values: &[u8]) -> TaskResult {
-        self.request(Request::Write { address, values })
+        self.0.request(Request::Write { address, values })
     }
 
     fn read(&mut self, address: u8) -> TaskResult<u8> {
-        self.register(address)
+        self.0.register(address)
     }
 
     fn step(&mut self) -> TaskResult {
-        self.run(STEP).map(drop)
+        self.0.run(STEP, |_| ())
     }
 }

@@ -1,11 +1,9 @@
 //! `cargo xtask docs`: docs/registers.md, generated from the register tables of the arm.
 
-use std::fs;
-use std::path::PathBuf;
-
 use sevenbot::table;
 
-use crate::run::{TaskResult, root};
+use crate::generated::GeneratedFile;
+use crate::run::TaskResult;
 
 const INTRODUCTION: &str = "\
 # Registers
@@ -27,25 +25,7 @@ a write, and the decisions D1 to D30 and M1 to M12.
 
 ";
 
-/// Writes the page.
-pub(crate) fn write() -> TaskResult {
-    Ok(fs::write(path(), page())?)
-}
-
-/// Fails if the page differs from the one that [`write()`] writes.
-pub(crate) fn check() -> TaskResult {
-    let found = fs::read_to_string(path()).unwrap_or_default();
-    if found == page() {
-        println!("docs/registers.md is up to date");
-        return Ok(());
-    }
-    Err("docs/registers.md is out of date: run `cargo xtask docs`".into())
-}
-
-fn path() -> PathBuf {
-    root().join("docs/registers.md")
-}
-
-fn page() -> String {
-    INTRODUCTION.to_owned() + &table::markdown()
+/// The page.
+pub(crate) fn files() -> TaskResult<Vec<GeneratedFile>> {
+    Ok(vec![("docs/registers.md".to_owned(), (INTRODUCTION.to_owned() + &table::markdown()).into_bytes())])
 }

@@ -1,11 +1,9 @@
 //! `cargo xtask docs`: the arm's model in the ROS packages, from the crate `arm-model`: URDF, and a mesh of each link as STL.
 
-use std::fs;
-use std::path::PathBuf;
-
 use arm_model::{Body, Mesh};
 
-use crate::run::{TaskResult, root};
+use crate::generated::GeneratedFile;
+use crate::run::TaskResult;
 
 /// The links with a mesh, and its body. The description that the node publishes names the files by their links.
 const MESHES: [(&str, Body); 9] = [
@@ -20,30 +18,12 @@ const MESHES: [(&str, Body); 9] = [
     ("opposite_finger_link", Body::OppositeFinger),
 ];
 
-/// Writes the files.
-pub(crate) fn write() -> TaskResult {
-    fs::create_dir_all(folder())?;
-    files()?.into_iter().try_for_each(|(name, bytes)| Ok(fs::write(folder().join(name), bytes)?))
-}
+const FOLDER: &str = "ros/sevenbot_ros/sevenbot_ros/model";
 
-/// Fails if a file differs from the one that [`write()`] writes.
-pub(crate) fn check() -> TaskResult {
-    for (name, bytes) in files()? {
-        if fs::read(folder().join(&name)).ok().as_ref() != Some(&bytes) {
-            return Err(format!("the model {name} for ROS is out of date: run `cargo xtask docs`").into());
-        }
-    }
-    println!("the model for ROS is up to date");
-    Ok(())
-}
-
-fn folder() -> PathBuf {
-    root().join("ros/sevenbot_ros/sevenbot_ros/model")
-}
-
-fn files() -> TaskResult<Vec<(String, Vec<u8>)>> {
-    let meshes = MESHES.into_iter().map(|(link, body)| (format!("{link}.stl"), stl(&body.mesh())));
-    let urdf = ("7bot_v2.urdf".to_owned(), arm_model::urdf()?.into_bytes());
+/// The description and the meshes.
+pub(crate) fn files() -> TaskResult<Vec<GeneratedFile>> {
+    let meshes = MESHES.into_iter().map(|(link, body)| (format!("{FOLDER}/{link}.stl"), stl(&body.mesh())));
+    let urdf = (format!("{FOLDER}/7bot_v2.urdf"), arm_model::urdf()?.into_bytes());
     Ok(meshes.chain([urdf]).collect())
 }
 

@@ -3,7 +3,7 @@
 use std::process::Command;
 
 pub(crate) use emulator::chip_program::{CHIP, ChipProgram, IMAGE, root, target_directory};
-pub(crate) use emulator::process::{ChildProcess, TIMEOUT, TaskResult, wait_for};
+pub(crate) use emulator::process::{ChildProcess, TaskResult, wait_for};
 
 /// The target triple of a browser.
 pub(crate) const BROWSER: &str = "wasm32-unknown-unknown";

@@ -5,10 +5,9 @@
 //! return 0.
 
 use std::fs;
-use std::process::{Command, Stdio};
 
 use crate::run::{self, ChildProcess, TaskResult, wait_for};
-use emulator::{QEMU, need_qemu};
+use emulator::need_qemu;
 
 /// An access to a register that the emulator lacks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -139,13 +138,9 @@ fn position(accesses: &[RegisterAccess<'_>], expected: RegisterAccess<'_>) -> Op
 fn log_of_start() -> TaskResult<String> {
     let folder = tempfile::tempdir()?;
     let path = folder.path().join("log");
-    let machine = Command::new(QEMU)
-        .args(["-M", "netduinoplus2", "-display", "none", "-monitor", "none", "-nodefaults"])
+    let machine = emulator::qemu(&run::IMAGE)
         .args(["-serial", "null", "-serial", "null", "-d", "unimp,guest_errors", "-D"])
         .arg(&path)
-        .arg("-kernel")
-        .arg(run::IMAGE.path())
-        .stdin(Stdio::null())
         .spawn()?;
     let _machine = ChildProcess(machine);
     wait_for("the image opens its host link", || {

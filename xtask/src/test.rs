@@ -7,8 +7,8 @@ use clap::Args;
 use crate::run::{CHECKED, CHIP, TESTED, TaskResult, build_for_browser, cargo, run};
 use crate::steps::{self, Stage, TestScope, long, quick, whole};
 use crate::{
-    count, crate_graph, decisions, deny, dist, footprint, fuzz, install, lerobot, modules, mujoco, no_panic,
-    python, registers_md, replays, ros, ros_model, start_up, system_tests, torture, trials, web,
+    count, deny, dist, footprint, fuzz, generated, install, lerobot, modules, mujoco, no_panic, python,
+    replays, ros, start_up, system_tests, torture, trials, web,
 };
 
 /// The scope of the run.
@@ -52,10 +52,7 @@ const STAGES: &[Stage] = &[
             quick("lints, chip", || {
                 cargo(&format!("clippy -p footprint -p firmware-stm32 --target {CHIP} -- -D warnings"))
             }),
-            quick("docs/registers.md is up to date", registers_md::check),
-            quick("the model in the ROS packages is up to date", ros_model::check),
-            quick("every decision of docs/protocol.md has tests", decisions::check),
-            quick("the crates in docs/design.md are up to date", crate_graph::check),
+            quick("generated documents are up to date, and every decision has tests", generated::check),
             quick("no cycle between files of a crate", modules::check),
             quick("licences, versions and sources of dependencies", deny::rules),
             whole("documentation", || {
@@ -74,15 +71,15 @@ const STAGES: &[Stage] = &[
         ],
     ],
     &[
-        // What computes,
+        // What computes. The counts come late: they need time that nothing else on an emulated chip takes from them,
         &[
             whole("start-up of the image", start_up::check),
-            whole("instructions are within their budgets", || count::check(false)),
             whole("recorded sessions, natively and in a WebAssembly module", replays::short),
             whole("worlds with injected faults", torture::short),
+            whole("instructions are within their budgets", || count::check(false)),
             whole("fuzzing", fuzz::fixed),
         ],
-        // beside what mostly waits for an arm, a browser or a network.
+        // beside what mostly waits for an arm or a network,
         &[
             whole("system tests, the image for the arm in an emulator", || {
                 system_tests::run_on(&system_tests::EMULATOR)
@@ -90,13 +87,14 @@ const STAGES: &[Stage] = &[
             whole("system tests, the controller on this computer with servos behind a USB adapter", || {
                 system_tests::run_on(&system_tests::ADAPTER)
             }),
-            whole("the page in a browser", || {
-                let variables = [("RUST_TEST_THREADS", "1"), ("POSES", "1000")];
-                run("cargo", &format!("test {TESTED} --test browser"), &variables)
-            }),
             whole("the Python package", python::check),
             whole("the ROS packages", ros::check),
         ],
+        // and for a browser.
+        &[whole("the page in a browser", || {
+            let variables = [("RUST_TEST_THREADS", "1"), ("POSES", "1000")];
+            run("cargo", &format!("test {TESTED} --test browser"), &variables)
+        })],
     ],
     &[&[
         long("more recorded sessions", replays::long),

@@ -11,40 +11,40 @@
 //! The ports of QEMU itself detect clients only once a second, and drop bytes before that.
 
 use std::io::{self, BufRead, BufReader, Write};
-use std::os::unix::net::UnixListener;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use clap::Args;
 use host_sim::signals::{SignalAction, Signals};
+use protocol_core::request::Request;
+use protocol_core::wire::FrameBuffer;
 use tempfile::TempDir;
 use tty_ports::symlink::Symlink;
 
 pub mod chip_program;
-pub mod debugger;
+mod debugger;
+pub mod emulated_arm;
+mod instruction_log;
 pub mod lockstep;
 mod log;
-pub mod monitor;
+pub mod logged_image;
+mod machine;
+mod monitor;
 pub mod process;
 mod relay;
+pub mod trace;
 
-use chip_program::{ChipProgram, IMAGE, SELF_TEST, root, target_directory};
+use chip_program::{IMAGE, SELF_TEST, target_directory};
 use log::Log;
-use monitor::Monitor;
+use machine::{Machine, servo_socket};
 use process::{ChildProcess, TaskResult};
 use relay::Relay;
 
-/// The emulator, and its package.
-pub const QEMU: &str = "qemu-system-arm";
+pub use machine::{QEMU, qemu};
 
 /// Instructions for the installation.
 const HOW_TO_GET_QEMU: &str =
     "`sudo apt-get install qemu-system-arm` installs it on Debian and Ubuntu, `brew install qemu` on a Mac";
-/// USART1's first control register (RM0090, section 30.6). Bytes before its setup are lost.
-pub const HOST_LINK_CONTROL: u32 = 0x4001_100C;
-/// The bits UE and RE of this register.
-pub const RECEIVER_ON: u32 = 1 << 13 | 1 << 2;
-
 /// The setup of the emulated arm.
 #[derive(Args)]
 pub struct EmulateArgs {
@@ -77,17 +77,14 @@ pub fn run(options: &EmulateArgs) -> TaskResult {
     let mut signals = Signals::catch()?;
     let folder = tempfile::tempdir()?;
     let servos = start_servos(&folder, &options.fault, options.angles.as_deref())?;
-    let host = UnixListener::bind(folder.path().join("host"))?;
-    let commands = UnixListener::bind(folder.path().join("monitor"))?;
     let image = if options.self_test { &SELF_TEST } else { &IMAGE };
     let mut servo_line = servo_socket(&folder);
     if let Some(path) = &options.servo_line {
         servo_line = format!("{servo_line},logfile={}", std::path::absolute(path)?.display());
     }
-    let _machine = start_machine(image, &folder, &servo_line, &[])?;
-    let mut relay = Relay::new(monitor::accept(&host)?)?;
-    let mut monitor = Monitor::new(monitor::accept(&commands)?, folder.path())?;
-    monitor.wait_for_bits(HOST_LINK_CONTROL, RECEIVER_ON)?;
+    let mut machine = Machine::start(image, folder, &servo_line, &[])?;
+    let mut relay = Relay::new(machine.host.try_clone()?)?;
+    machine.wait_for_host_link()?;
     let mut log = options.log.then(|| Log::open(&image.path())).transpose()?;
     let port = relay.port().to_owned();
     let _link = options.link.as_deref().map(|path| Symlink::new(path, &port)).transpose()?;
@@ -99,12 +96,12 @@ pub fn run(options: &EmulateArgs) -> TaskResult {
             match action {
                 SignalAction::End => return Ok(()),
                 SignalAction::Unplug => {}
-                SignalAction::PowerCycle => power_cycle(&servos, &mut monitor)?,
-                SignalAction::RestartController => monitor.execute("system_reset", "")?,
+                SignalAction::PowerCycle => power_cycle(&servos, &mut machine)?,
+                SignalAction::RestartController => machine.reset()?,
             }
         }
         if let Some(log) = &mut log {
-            log.print_new(&mut monitor)?;
+            log.print_new(&mut machine.monitor)?;
         }
         relay.transfer()?;
         relay.sleep(&signals, log.is_some())?;
@@ -128,7 +125,7 @@ pub fn need_qemu() -> TaskResult {
 }
 
 /// Starts the seven servos on a socket. They write their true angles to `angles`.
-pub fn start_servos(folder: &TempDir, faults: &[String], angles: Option<&Path>) -> TaskResult<ChildProcess> {
+fn start_servos(folder: &TempDir, faults: &[String], angles: Option<&Path>) -> TaskResult<ChildProcess> {
     let mut command = Command::new(target_directory().join("debug").join("host-sim"));
     command.arg("--quiet").arg("--servo-socket").arg(folder.path().join("servos"));
     faults.iter().for_each(|fault| {
@@ -145,40 +142,17 @@ pub fn start_servos(folder: &TempDir, faults: &[String], angles: Option<&Path>) 
     if line.starts_with("ready ") { Ok(child) } else { Err("host-sim did not start: see above")? }
 }
 
-/// The socket of the servos, as an option of the emulator.
-pub fn servo_socket(folder: &TempDir) -> String {
-    format!("socket,path={}", folder.path().join("servos").display())
-}
-
-/// Starts the emulator with an image. It connects to the sockets in `folder` before it starts. `servos` is the character
-/// device of the servo bus, and `options` are further options of the emulator.
-pub fn start_machine(
-    image: &ChipProgram,
-    folder: &TempDir,
-    servos: &str,
-    options: &[&str],
-) -> TaskResult<ChildProcess> {
-    let path = |name: &str| folder.path().join(name).display().to_string();
-    let child = Command::new(QEMU)
-        .current_dir(root())
-        .args(["-M", "netduinoplus2", "-display", "none", "-monitor", "none", "-nodefaults"])
-        .args(["-chardev", &format!("socket,id=host,path={}", path("host"))])
-        .args(["-serial", "chardev:host"])
-        .args(["-chardev", &format!("{servos},id=servos")])
-        .args(["-serial", "chardev:servos"])
-        .args(["-qmp", &format!("unix:{}", path("monitor"))])
-        .arg("-kernel")
-        .arg(image.path())
-        .args(options)
-        .stdin(Stdio::null())
-        .stdout(Stdio::null())
-        .spawn()?;
-    Ok(ChildProcess(child))
-}
-
-fn power_cycle(servos: &ChildProcess, monitor: &mut Monitor) -> TaskResult {
+fn power_cycle(servos: &ChildProcess, machine: &mut Machine) -> TaskResult {
     let id = i32::try_from(servos.0.id()).ok().and_then(rustix::process::Pid::from_raw);
     let id = id.ok_or("host-sim has no process id")?;
     rustix::process::kill_process(id, rustix::process::Signal::HUP)?;
-    monitor.execute("system_reset", "")
+    machine.reset()
+}
+
+/// Encodes a request as a frame.
+#[must_use]
+pub fn frame(request: Request<'_>) -> Vec<u8> {
+    let mut buffer = FrameBuffer::new();
+    request.encode(&mut buffer);
+    buffer.to_vec()
 }

@@ -10,21 +10,20 @@
 //! interrupt.
 
 use std::collections::VecDeque;
-use std::fs::{self, File};
-use std::io::{ErrorKind, Read, Seek, SeekFrom, Write};
-use std::os::unix::net::{UnixListener, UnixStream};
-use std::path::PathBuf;
+use std::io::{ErrorKind, Read, Write};
+use std::os::unix::net::UnixStream;
 
 use arm_sim::servo_bus::ServoBus;
+use linked_image::Effect;
+use linked_image::Program;
 use protocol_core::time::Instant;
-use tempfile::TempDir;
 
 use crate::chip_program::IMAGE;
 use crate::debugger::Debugger;
-use crate::monitor::{self, Monitor};
-use crate::process::{ChildProcess, TaskResult};
-use linked_image::Effect;
-use linked_image::Program;
+use crate::instruction_log::InstructionLog;
+use crate::machine::Machine;
+use crate::process::TaskResult;
+use crate::trace::TraceEvent;
 
 /// The count of TIM2, the clock of the image, in microseconds.
 const CLOCK: u32 = 0x4000_0024;
@@ -39,15 +38,12 @@ pub struct Lockstep<B> {
     /// The servo bus.
     pub bus: B,
     debugger: Debugger,
-    monitor: Monitor,
-    log: PathBuf,
+    machine: Machine,
+    log: InstructionLog,
     host: ImageLine,
     servos: ImageLine,
     sent_to_servos: usize,
     now: Instant,
-    // In this order: the emulator ends before the sockets.
-    _machine: ChildProcess,
-    _folder: TempDir,
 }
 
 /// Numbers of bytes that the image has sent.
@@ -69,20 +65,13 @@ impl<B: ServoBus> Lockstep<B> {
     /// Starts the image with `bus`, and runs it until it sleeps for the first time.
     pub fn start(bus: B) -> TaskResult<Self> {
         let folder = tempfile::tempdir()?;
-        let listen = |name: &str| UnixListener::bind(folder.path().join(name));
-        let (host, servos) = (listen("host")?, listen("servos")?);
-        let commands = listen("monitor")?;
-        let socket = folder.path().join("debugger");
-        let chardev = format!("socket,id=debugger,path={},server=on,wait=off", socket.display());
-        let log = folder.path().join("log");
-        let log_option = log.display().to_string();
-        let options = ["-S", "-icount", "shift=3,sleep=on", "-singlestep", "-D", &log_option];
-        let options = [&options[..], &["-chardev", &chardev, "-gdb", "chardev:debugger"]].concat();
-        let machine = crate::start_machine(&IMAGE, &folder, &crate::servo_socket(&folder), &options)?;
-        let line = |listener, status| ImageLine::accept(listener, status);
-        let (host, servos) = (line(&host, HOST_STATUS)?, line(&servos, SERVO_STATUS)?);
-        let monitor = Monitor::new(monitor::accept(&commands)?, folder.path())?;
-        let mut debugger = Debugger::connect(&socket)?;
+        let log = InstructionLog::new(&folder);
+        let options = log.options("shift=3,sleep=on");
+        let options: Vec<_> = options.iter().map(String::as_str).chain(["-S"]).collect();
+        let (machine, servos) = Machine::start_with_bus(&IMAGE, folder, &options)?;
+        let host = ImageLine::new(machine.host.try_clone()?, HOST_STATUS)?;
+        let servos = ImageLine::new(servos, SERVO_STATUS)?;
+        let mut debugger = machine.debugger()?;
         let file = IMAGE.read()?;
         let program = Program::read(&file)?;
         for sleep in program.addresses_of(Effect::WaitForInterrupt) {
@@ -92,18 +81,7 @@ impl<B: ServoBus> Lockstep<B> {
         }
         debugger.run()?;
         let now = Instant::ZERO;
-        Ok(Self {
-            bus,
-            debugger,
-            monitor,
-            log,
-            host,
-            servos,
-            sent_to_servos: 0,
-            now,
-            _machine: machine,
-            _folder: folder,
-        })
+        Ok(Self { bus, debugger, machine, log, host, servos, sent_to_servos: 0, now })
     }
 
     /// Sends bytes to the host link of the image, from its next stop on.
@@ -117,20 +95,11 @@ impl<B: ServoBus> Lockstep<B> {
         Ok(Sent { to_host, to_servos: std::mem::take(&mut self.sent_to_servos) })
     }
 
-    /// Runs the image until it sleeps at `until` or later, and returns the emulator's log of its instructions.
-    pub fn log_until(&mut self, until: Instant) -> TaskResult<String> {
-        let before = fs::metadata(&self.log).map_or(0, |log| log.len());
-        self.monitor.human("log exec,nochain")?;
-        let advanced = self.advance(until);
-        self.monitor.human("log none")?;
-        advanced?;
-        let mut file = File::options().read(true).write(true).open(&self.log)?;
-        file.seek(SeekFrom::Start(before))?;
-        let mut text = String::new();
-        file.read_to_string(&mut text)?;
-        // The emulator writes on at its own position, so the file stays large but takes no space.
-        file.set_len(0)?;
-        Ok(text)
+    /// Runs the image until it sleeps at `until` or later, and returns the instructions that it executes.
+    pub fn log_until(&mut self, until: Instant) -> TaskResult<Vec<TraceEvent>> {
+        self.log.begin(&mut self.machine.monitor)?;
+        self.advance(until)?;
+        self.log.end(&mut self.machine.monitor)
     }
 
     /// Runs the image until it sleeps at `until` or later.
@@ -153,8 +122,7 @@ impl<B: ServoBus> Lockstep<B> {
 }
 
 impl ImageLine {
-    fn accept(listener: &UnixListener, status: u32) -> TaskResult<Self> {
-        let stream = monitor::accept(listener)?;
+    fn new(stream: UnixStream, status: u32) -> TaskResult<Self> {
         stream.set_nonblocking(true)?;
         Ok(Self { stream, status, to_image: VecDeque::new() })
     }

@@ -1,7 +1,7 @@
 //! Programs of `footprint` that count the instructions of the cores and their peers, and print the counts.
 
 use std::io::{BufRead, BufReader};
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 
 use crate::run::{ChildProcess, ChipProgram, TaskResult};
 
@@ -10,13 +10,9 @@ pub(crate) type NamedCount = (String, u64);
 
 /// Runs a program in the emulator and returns its counts.
 pub(crate) fn figures(program: &ChipProgram) -> TaskResult<Vec<NamedCount>> {
-    let child = Command::new(emulator::QEMU)
-        .args(["-M", "netduinoplus2", "-display", "none", "-monitor", "none", "-nodefaults"])
+    let child = emulator::qemu(program)
         .args(["-chardev", "stdio,id=figures,signal=off", "-serial", "chardev:figures"])
         .args(["-icount", "shift=0,sleep=off"])
-        .arg("-kernel")
-        .arg(program.path())
-        .stdin(Stdio::null())
         .stdout(Stdio::piped())
         .spawn()?;
     let mut child = ChildProcess(child);

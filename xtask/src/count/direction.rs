@@ -1,8 +1,8 @@
 //! The direction of a buffered servo bus, in a log of the image: the board drives the bus while it sends, and listens otherwise.
 //! The emulator sends a byte in no time, so it cannot show when the last stop bit leaves.
 
-use super::trace::TraceEvent;
 use crate::run::TaskResult;
+use emulator::trace::TraceEvent;
 
 /// USART2_DR.
 const SERVO_DATA: u64 = 0x4000_4404;

@@ -10,11 +10,12 @@ use protocol_core::registers::map::{FINE_TARGET, PRESENT_POSITION, SPEED, TARGET
 use protocol_core::request::Request;
 
 use super::direction;
-use super::machine::{Machine, frame};
 use super::masked::longest_stretch;
-use super::trace::{self, TraceEvent};
 use crate::budget::Figure;
 use crate::run::{IMAGE, TaskResult};
+use emulator::frame;
+use emulator::logged_image::LoggedImage;
+use emulator::trace::{self, TraceEvent};
 use linked_image::Effect;
 use linked_image::Program;
 
@@ -92,18 +93,18 @@ pub(crate) fn figures() -> TaskResult<Vec<Figure>> {
     let addresses = ImageAddresses::of(&Program::read(&file)?)?;
     let silence = addresses.silence()?;
     let delayed = behind_a_false_header()?;
-    let mut machine = Machine::with_servos()?;
+    let mut image = LoggedImage::with_servos()?;
     let write = Request::Write { address: TARGET_POSITION.address, values: &POSE };
     let answered = |event: &TraceEvent| *event == TraceEvent::Wrote(HOST_DATA);
     let asleep = |event: &TraceEvent| addresses.is_sleep(event);
-    let read = addresses.paths(&mut machine, READ, 1, answered)?;
-    let read_whole = addresses.paths(&mut machine, READ, 1, asleep)?;
-    let write = addresses.paths(&mut machine, write, 1, asleep)?;
+    let read = addresses.paths(&mut image, READ, 1, answered)?;
+    let read_whole = addresses.paths(&mut image, READ, 1, asleep)?;
+    let write = addresses.paths(&mut image, write, 1, asleep)?;
     let fine = Request::Write { address: FINE_TARGET.address, values: FINE_POSE.as_flattened() };
-    let fine = addresses.paths(&mut machine, fine, 1, asleep)?;
-    let last_but_one = addresses.paths(&mut machine, READ, 2, asleep)?;
-    let first = addresses.paths(&mut machine, READ, 7, asleep)?;
-    let moving = while_moving(&mut machine)?;
+    let fine = addresses.paths(&mut image, fine, 1, asleep)?;
+    let last_but_one = addresses.paths(&mut image, READ, 2, asleep)?;
+    let first = addresses.paths(&mut image, READ, 7, asleep)?;
+    let moving = while_moving(&mut image)?;
     direction::check(&moving)?;
     let mut figures = vec![
         Figure::new("image: 10 ms without traffic", silence.ten_millis),
@@ -128,12 +129,12 @@ pub(crate) fn figures() -> TaskResult<Vec<Figure>> {
 }
 
 /// Logs the arm while all joints move. If a busy machine shows too few control cycles, logs the move back as well.
-fn while_moving(machine: &mut Machine) -> TaskResult<Vec<TraceEvent>> {
-    machine.send(&frame(Request::Write { address: SPEED.address, values: &[5; JOINTS] }))?;
+fn while_moving(image: &mut LoggedImage) -> TaskResult<Vec<TraceEvent>> {
+    image.send(&frame(Request::Write { address: SPEED.address, values: &[5; JOINTS] }))?;
     for target in [0, 90].into_iter().cycle().take(MAX_WATCHES) {
         let values = &[target; JOINTS];
-        machine.send(&frame(Request::Write { address: TARGET_POSITION.address, values }))?;
-        let events = watch_for(machine, WATCH_TIME)?;
+        image.send(&frame(Request::Write { address: TARGET_POSITION.address, values }))?;
+        let events = watch_for(image, WATCH_TIME)?;
         if trace::times(&events, TraceEvent::Wrote(SERVO_DATA)) >= MIN_CYCLES * GOAL_FRAME_BYTES {
             return Ok(events);
         }
@@ -142,8 +143,8 @@ fn while_moving(machine: &mut Machine) -> TaskResult<Vec<TraceEvent>> {
 }
 
 /// Logs the arm for this time.
-fn watch_for(machine: &mut Machine, time: Duration) -> TaskResult<Vec<TraceEvent>> {
-    machine.watch(|_| {
+fn watch_for(image: &mut LoggedImage, time: Duration) -> TaskResult<Vec<TraceEvent>> {
+    image.watch(|_| {
         sleep(time);
         Ok(())
     })
@@ -153,14 +154,14 @@ fn watch_for(machine: &mut Machine, time: Duration) -> TaskResult<Vec<TraceEvent
 /// tick before the loop takes the bytes, and up to a tick by which the measurement begins too early. The most of several
 /// measurements.
 fn behind_a_false_header() -> TaskResult<u64> {
-    let mut machine = Machine::alone()?;
+    let mut image = LoggedImage::alone()?;
     let mut requests = vec![0xAA, 0x77, 6, 0, 0xFF];
     requests.extend(frame(READ).repeat(DELAYED_READS));
     let mut delays = Vec::new();
     for _ in 0..DELAY_TRIES {
-        let events = machine.watch(|machine| {
-            machine.send(&requests)?;
-            (0..DELAYED_READS).try_for_each(|_| machine.reply(PRESENT_POSITION.count).map(|_| ()))
+        let events = image.watch(|image| {
+            image.send(&requests)?;
+            (0..DELAYED_READS).try_for_each(|_| image.reply(PRESENT_POSITION.count).map(|_| ()))
         })?;
         sleep(DROP_TIME);
         delays.extend(first_reply_after_micros(&events));
@@ -207,13 +208,13 @@ impl ImageAddresses {
     /// servos. The median, because a log may or may not contain the log lines of each second. The longest masked stretch needs
     /// one of each.
     fn silence(&self) -> TaskResult<Silence> {
-        let mut machine = Machine::alone()?;
+        let mut image = LoggedImage::alone()?;
         // The pattern repeats in virtual time, which runs fast.
         sleep(SILENCE);
         let (mut log_lines, mut masked) = (0, 0);
         // A busy machine shows less in the same time.
         for times in (1..=5).chain(repeat_n(5, MAX_WATCHES)) {
-            let events = watch_for(&mut machine, SILENCE * times)?;
+            let events = watch_for(&mut image, SILENCE * times)?;
             log_lines += events.iter().filter(|event| trace::is_step_at(event, self.log_line)).count();
             masked = masked.max(longest_stretch(&events, &self.effects));
             let ticks = trace::between(&events, |event| trace::is_step_at(event, self.wake_up));
@@ -233,14 +234,14 @@ impl ImageAddresses {
     /// byte arrives, and no other event follows. A pause before the byte makes the deframer search behind the incomplete frame.
     fn paths(
         &self,
-        machine: &mut Machine,
+        image: &mut LoggedImage,
         request: Request<'_>,
         from_last: usize,
         end: impl Fn(&TraceEvent) -> bool,
     ) -> TaskResult<u64> {
         let mut paths = Vec::new();
         for _ in 0..TRIES {
-            let events = send_and_watch(machine, request, from_last)?;
+            let events = send_and_watch(image, request, from_last)?;
             paths.extend(self.path(&events, &end));
             if paths.len() >= SAMPLES {
                 break;
@@ -323,18 +324,18 @@ impl ImageAddresses {
 /// Sends a request, and logs the arm from one of its bytes on. The arm sleeps when this byte arrives. `from_last` is 1 for
 /// the last byte.
 fn send_and_watch(
-    machine: &mut Machine,
+    image: &mut LoggedImage,
     request: Request<'_>,
     from_last: usize,
 ) -> TaskResult<Vec<TraceEvent>> {
     let bytes = frame(request);
     let (before, rest) = bytes.split_at(bytes.len() - from_last);
     let (byte, after) = rest.split_first().ok_or("the request has fewer bytes")?;
-    machine.send(before)?;
-    let events = machine.watch_byte(*byte)?;
-    machine.send(after)?;
+    image.send(before)?;
+    let events = image.watch_byte(*byte)?;
+    image.send(after)?;
     // On a busy machine the pause may be too long (D4), so that there is no reply. The caller tries again.
-    machine.settle()?;
+    image.settle()?;
     Ok(events)
 }
 

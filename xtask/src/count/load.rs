@@ -14,11 +14,10 @@ use protocol_core::registers::map::{
 use protocol_core::request::Request;
 use protocol_core::time::{Duration, Instant};
 
-use super::machine::frame;
-use super::trace;
 use crate::budget::Figure;
 use crate::run::TaskResult;
 use emulator::lockstep::Lockstep;
+use emulator::{frame, trace};
 
 /// The time between two frames of targets, in milliseconds; also the set-point period.
 const FRAME_MILLIS: u16 = 5;
@@ -74,7 +73,7 @@ fn count() -> TaskResult<(u64, usize)> {
             image.advance(until)?;
             image.take_sent()?;
         } else {
-            steps += trace::steps(&trace::parse(&image.log_until(until)?));
+            steps += trace::steps(&image.log_until(until)?);
             let sent = image.take_sent()?;
             reported += sent.to_host;
             steps += PER_BYTE_SENT * (sent.to_host + sent.to_servos) as u64;

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::trace::TraceEvent;
+use emulator::trace::TraceEvent;
 use linked_image::Effect;
 
 /// The most instructions between the one that masks interrupts and the one that unmasks them. Sleep ends a stretch, because an

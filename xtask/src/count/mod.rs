@@ -7,9 +7,7 @@ mod cores;
 mod direction;
 mod image;
 mod load;
-mod machine;
 mod masked;
-mod trace;
 
 pub(crate) use cores::NamedCount;
 

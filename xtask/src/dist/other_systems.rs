@@ -4,7 +4,8 @@ use super::platform::{WINDOWS, add_target};
 use super::tools;
 use crate::run::{TaskResult, root, run_command, target_directory};
 
-const SYSTEMS: [&str; 3] = [WINDOWS.triple, "aarch64-apple-darwin", "x86_64-apple-darwin"];
+/// Our code is the same for both kinds of Mac.
+const SYSTEMS: [&str; 2] = [WINDOWS.triple, "aarch64-apple-darwin"];
 /// All other crates that run there are dependencies of these.
 const PACKAGES: [&str; 3] = ["sevenbot-cli", "sevenbot-python", "sevenbot-serve"];
 

@@ -19,7 +19,7 @@ const PORT_A: u64 = 0x4002_0018;
 
 /// An event of the log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum TraceEvent {
+pub enum TraceEvent {
     /// An instruction was executed.
     Step {
         /// Its address.
@@ -38,7 +38,7 @@ pub(crate) enum TraceEvent {
 }
 
 /// Parses a log.
-pub(crate) fn parse(log: &str) -> Vec<TraceEvent> {
+pub fn parse(log: &str) -> Vec<TraceEvent> {
     let mut events = Vec::new();
     for line in log.lines() {
         if line.starts_with("Stopped ") || line.starts_with("cpu_io_recompile") {
@@ -75,22 +75,22 @@ fn hexadecimal(digits: &str) -> Option<u64> {
 }
 
 /// The number of executed instructions.
-pub(crate) fn steps(events: &[TraceEvent]) -> u64 {
+pub fn steps(events: &[TraceEvent]) -> u64 {
     events.iter().filter(|event| matches!(event, TraceEvent::Step { .. })).count() as u64
 }
 
 /// True if this is the execution of the instruction at `address`.
-pub(crate) fn is_step_at(event: &TraceEvent, address: u64) -> bool {
+pub fn is_step_at(event: &TraceEvent, address: u64) -> bool {
     matches!(event, TraceEvent::Step { at, .. } if *at == address)
 }
 
 /// The number of these accesses to a register.
-pub(crate) fn times(events: &[TraceEvent], access: TraceEvent) -> usize {
+pub fn times(events: &[TraceEvent], access: TraceEvent) -> usize {
     events.iter().filter(|event| **event == access).count()
 }
 
 /// The ranges of events that begin with a mark and end before the next one.
-pub(crate) fn between(events: &[TraceEvent], is_mark: impl Fn(&TraceEvent) -> bool) -> Vec<Range<usize>> {
+pub fn between(events: &[TraceEvent], is_mark: impl Fn(&TraceEvent) -> bool) -> Vec<Range<usize>> {
     let marks: Vec<_> =
         events.iter().enumerate().filter(|(_, event)| is_mark(event)).map(|(at, _)| at).collect();
     marks.iter().zip(marks.iter().skip(1)).map(|(&from, &to)| from..to).collect()
@@ -98,7 +98,7 @@ pub(crate) fn between(events: &[TraceEvent], is_mark: impl Fn(&TraceEvent) -> bo
 
 /// The calls of the handler at `entry`, from its first instruction to its return, without those that another of `entries`
 /// interrupts.
-pub(crate) fn handler_calls<'a>(
+pub fn handler_calls<'a>(
     events: &'a [TraceEvent],
     entry: u64,
     entries: &[u64],
