@@ -1,39 +1,14 @@
-//! `cargo xtask docs`: files that are generated as a whole, and sections of documents, between two marks.
+//! Generated files, and generated sections of documents, between two marks.
 
 use std::fs;
 
 use crate::run::{TaskResult, root};
-use crate::{crate_graph, decisions, registers_md, ros_model};
 
 /// The path of a file from the root of the workspace, and what it has to contain.
 pub(crate) type GeneratedFile = (String, Vec<u8>);
 
-const GENERATORS: [fn() -> TaskResult<Vec<GeneratedFile>>; 4] =
-    [registers_md::files, ros_model::files, decisions::files, crate_graph::files];
-
 /// The last line of every generated section.
 const END: &str = "<!-- end -->\n";
-
-/// Writes all files.
-pub(crate) fn write() -> TaskResult {
-    for generate in GENERATORS {
-        generate()?.into_iter().try_for_each(|(path, content)| fs::write(root().join(path), content))?;
-    }
-    Ok(())
-}
-
-/// Fails if a file has another content.
-pub(crate) fn check() -> TaskResult {
-    for (path, content) in
-        GENERATORS.iter().map(|generate| generate()).collect::<TaskResult<Vec<_>>>()?.concat()
-    {
-        if fs::read(root().join(&path)).ok() != Some(content) {
-            Err(format!("{path} is out of date: run `cargo xtask docs`"))?;
-        }
-        println!("{path} is up to date");
-    }
-    Ok(())
-}
 
 /// A document with another content of the section that begins after the line `begin`.
 pub(crate) fn with_section(document: &str, begin: &str, content: &str) -> TaskResult<Vec<GeneratedFile>> {

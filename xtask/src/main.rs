@@ -12,6 +12,7 @@ mod crate_graph;
 mod decisions;
 mod deny;
 mod dist;
+mod docs;
 mod footprint;
 mod fuzz;
 mod generated;
@@ -141,8 +142,8 @@ fn main() -> ExitCode {
 fn run_task(task: &Task) -> TaskResult {
     match task {
         Task::Test(options) => test::run_steps(options),
-        Task::Docs { check: true } => generated::check(),
-        Task::Docs { check: false } => generated::write(),
+        Task::Docs { check: true } => docs::check(),
+        Task::Docs { check: false } => docs::write(),
         Task::Dist(options) => dist::run(options),
         Task::Modules => modules::check(),
         Task::Torture(options) => torture::run(options),

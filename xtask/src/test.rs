@@ -7,8 +7,8 @@ use clap::Args;
 use crate::run::{CHECKED, CHIP, TESTED, TaskResult, build_for_browser, cargo, run};
 use crate::steps::{self, Stage, TestScope, long, quick, whole};
 use crate::{
-    count, deny, dist, footprint, fuzz, generated, install, lerobot, modules, mujoco, no_panic, python,
-    replays, ros, start_up, system_tests, torture, trials, web,
+    count, deny, dist, docs, footprint, fuzz, install, lerobot, modules, mujoco, no_panic, python, replays,
+    ros, start_up, system_tests, torture, trials, web,
 };
 
 /// The scope of the run.
@@ -52,7 +52,7 @@ const STAGES: &[Stage] = &[
             quick("lints, chip", || {
                 cargo(&format!("clippy -p footprint -p firmware-stm32 --target {CHIP} -- -D warnings"))
             }),
-            quick("generated documents are up to date, and every decision has tests", generated::check),
+            quick("generated documents are up to date, and every decision has tests", docs::check),
             quick("no cycle between files of a crate", modules::check),
             quick("licences, versions and sources of dependencies", deny::rules),
             whole("documentation", || {
