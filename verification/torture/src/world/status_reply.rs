@@ -38,10 +38,11 @@ pub(super) fn torque_switch(params: &[u8]) -> Option<u8> {
     params.first().copied().filter(|_| has_torque_switch(params))
 }
 
-/// The goal in the parameters of a status reply in counts, if the question asked for the torque switch.
+/// The goal in the parameters of a status reply in counts, if the question asked for the torque switch. A goal that was damaged on
+/// the wire may be beyond the end of the servo, which then goes to its end.
 pub(super) fn goal(params: &[u8]) -> Option<u16> {
     let &[_, _, high, low, ..] = params else { return None };
-    has_torque_switch(params).then_some(u16::from_be_bytes([high, low]))
+    has_torque_switch(params).then_some(u16::from_be_bytes([high, low]).min(Reading::MAX_POSITION))
 }
 
 fn has_torque_switch(params: &[u8]) -> bool {
@@ -51,4 +52,19 @@ fn has_torque_switch(params: &[u8]) -> bool {
 fn has_valid_checksum(frame: &[u8]) -> bool {
     let [_, _, covered @ .., checksum] = frame else { return false };
     covered.iter().fold(0, |sum: u8, byte| sum.wrapping_add(*byte)) == !checksum
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_goal_beyond_the_end_is_the_end() {
+        let mut params = [0; 25];
+        for (written, meant) in [(512_u16, 512), (1_023, 1_023), (0xFF00, 1_023)] {
+            [params[2], params[3]] = written.to_be_bytes();
+            assert_eq!(goal(&params), Some(meant));
+        }
+        assert_eq!(goal(&params[..9]), None);
+    }
 }
