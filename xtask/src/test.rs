@@ -71,15 +71,15 @@ const STAGES: &[Stage] = &[
         ],
     ],
     &[
-        // What computes. The counts come late: they need time that nothing else on an emulated chip takes from them,
+        // What computes. The counts have an emulated chip of their own while the page is tested,
         &[
             whole("start-up of the image", start_up::check),
             whole("recorded sessions, natively and in a WebAssembly module", replays::short),
-            whole("worlds with injected faults", torture::short),
             whole("instructions are within their budgets", || count::check(false)),
+            whole("worlds with injected faults", torture::short),
             whole("fuzzing", fuzz::fixed),
         ],
-        // beside what mostly waits for an arm or a network,
+        // beside what mostly waits for an arm, a browser or a network.
         &[
             whole("system tests, the image for the arm in an emulator", || {
                 system_tests::run_on(&system_tests::EMULATOR)
@@ -87,14 +87,13 @@ const STAGES: &[Stage] = &[
             whole("system tests, the controller on this computer with servos behind a USB adapter", || {
                 system_tests::run_on(&system_tests::ADAPTER)
             }),
+            whole("the page in a browser", || {
+                let variables = [("RUST_TEST_THREADS", "1"), ("POSES", "1000")];
+                run("cargo", &format!("test {TESTED} --test browser"), &variables)
+            }),
             whole("the Python package", python::check),
             whole("the ROS packages", ros::check),
         ],
-        // and for a browser.
-        &[whole("the page in a browser", || {
-            let variables = [("RUST_TEST_THREADS", "1"), ("POSES", "1000")];
-            run("cargo", &format!("test {TESTED} --test browser"), &variables)
-        })],
     ],
     &[&[
         long("more recorded sessions", replays::long),
