@@ -96,5 +96,12 @@ def test_a_program_ends_on_the_image_for_the_arm_where_it_does_in_the_page(
 ) -> None:
     patient_arm = functools.partial(sevenbot.Arm, timeout=ANSWER_TIME)
     with started([f"{PROGRAMS}/xtask", "emulate", "--no-build"], tmp_path / "arm") as link:
-        run_here(program, patient_arm, monkeypatch, [str(link)])
+        for tries in range(3):
+            try:
+                run_here(program, patient_arm, monkeypatch, [str(link)])
+                break
+            except sevenbot.NotReached as failure:
+                # A machine that is too busy: the arm stops on its way, as it has to.
+                if tries == 2 or "this program paused" not in str(failure):
+                    raise
         assert_at_end(program, link)
