@@ -199,13 +199,13 @@ def test_two_arms_in_two_namespaces(start: Start, client: Clients) -> None:
     left, right = client("left", simulated_time=True), client("right")
     left.connect()
     right.connect()
-    for _ in range(200):
+
+    def has_moved() -> bool:
         left.send({"joint_1": min(left.degrees()[0] + 3.0, 20.0)})
-        left.spin(0.02)
         right.spin(0.0)
-        if left.degrees()[0] > 18.0:
-            break
-    left.until(lambda: left.degrees()[0] > 18.0, "motion of the left arm")
+        return left.degrees()[0] > 18.0
+
+    left.until(has_moved, "motion of the left arm")
     right.states.clear()
     right.until(lambda: len(right.states) > 5)
     assert right.degrees()[0] == pytest.approx(0.0, abs=0.5)
