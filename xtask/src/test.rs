@@ -71,7 +71,7 @@ const STAGES: &[Stage] = &[
         ],
     ],
     &[
-        // What computes. The counts have an emulated chip of their own while the page is tested,
+        // What computes (the counts once the first tests on an emulated chip are over),
         &[
             whole("start-up of the image", start_up::check),
             whole("recorded sessions, natively and in a WebAssembly module", replays::short),

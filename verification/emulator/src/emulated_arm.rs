@@ -11,7 +11,6 @@ use host_sim::servo_socket::exchange;
 use protocol_core::request::Request;
 use protocol_core::time::{Duration, Instant};
 
-use crate::chip_program::IMAGE;
 use crate::frame;
 use crate::machine::Machine;
 use crate::process::TaskResult;
@@ -36,7 +35,7 @@ pub struct EmulatedArm {
 impl EmulatedArm {
     /// Switches an arm on.
     pub fn start() -> TaskResult<Self> {
-        let (mut machine, bus) = Machine::start_with_bus(&IMAGE, tempfile::tempdir()?, &[])?;
+        let (mut machine, bus) = Machine::start_with_bus(tempfile::tempdir()?, &[])?;
         machine.host.set_nonblocking(true)?;
         machine.wait_for_host_link()?;
         let mut clock = RealClock::default();

@@ -45,6 +45,7 @@ pub use machine::{QEMU, qemu};
 /// Instructions for the installation.
 const HOW_TO_GET_QEMU: &str =
     "`sudo apt-get install qemu-system-arm` installs it on Debian and Ubuntu, `brew install qemu` on a Mac";
+
 /// The setup of the emulated arm.
 #[derive(Args)]
 pub struct EmulateArgs {

@@ -68,7 +68,7 @@ impl<B: ServoBus> Lockstep<B> {
         let log = InstructionLog::new(&folder);
         let options = log.options("shift=3,sleep=on");
         let options: Vec<_> = options.iter().map(String::as_str).chain(["-S"]).collect();
-        let (machine, servos) = Machine::start_with_bus(&IMAGE, folder, &options)?;
+        let (machine, servos) = Machine::start_with_bus(folder, &options)?;
         let host = ImageLine::new(machine.host.try_clone()?, HOST_STATUS)?;
         let servos = ImageLine::new(servos, SERVO_STATUS)?;
         let mut debugger = machine.debugger()?;

@@ -12,7 +12,7 @@ use std::process::{Command, Stdio};
 
 use tempfile::TempDir;
 
-use crate::chip_program::{ChipProgram, root};
+use crate::chip_program::{ChipProgram, IMAGE, root};
 use crate::debugger::Debugger;
 use crate::monitor::{self, Monitor};
 use crate::process::{ChildProcess, TaskResult};
@@ -60,15 +60,11 @@ impl Machine {
         Ok(Self { monitor, host, _child: child, folder })
     }
 
-    /// Starts an image whose servos are in this process. Returns the end of their bus.
-    pub(crate) fn start_with_bus(
-        image: &ChipProgram,
-        folder: TempDir,
-        options: &[&str],
-    ) -> TaskResult<(Self, UnixStream)> {
+    /// Starts the image for the arm, with servos in this process. Returns the end of their bus.
+    pub(crate) fn start_with_bus(folder: TempDir, options: &[&str]) -> TaskResult<(Self, UnixStream)> {
         let bus = listen(&folder, "servos")?;
         let servos = servo_socket(&folder);
-        let machine = Self::start(image, folder, &servos, options)?;
+        let machine = Self::start(&IMAGE, folder, &servos, options)?;
         let bus = monitor::accept(&bus)?;
         bus.set_nonblocking(true)?;
         Ok((machine, bus))
