@@ -10,7 +10,8 @@
 //! ```
 //!
 //! It reads no clock and opens no port: time and bytes are arguments. The blocking library, the hub of `sevenbot serve` and
-//! the page in a browser are shells round it. It does not know what the registers of the arm mean; [`sharing`] has those of a server.
+//! the page in a browser are shells round it. It does not know what the registers of the arm mean; beside it are those of a server
+//! ([`sharing`]), and what every stop has to know of the arm's limits ([`keep_limits`]).
 //!
 //! ```
 //! use host_link::{HostEvent, HostLink, LinkOptions, Patience, Span};
@@ -36,6 +37,7 @@
 #![forbid(unsafe_code)]
 
 mod event;
+mod limits;
 mod line_time;
 mod link;
 mod open_reads;
@@ -45,6 +47,7 @@ mod snapshot;
 mod span;
 
 pub use event::{HostEvent, RequestId};
+pub use limits::keep_limits;
 pub use line_time::{ROUND_TRIP, time_on_line};
 pub use link::{HostLink, LinkOptions};
 pub use open_reads::Patience;

@@ -1,14 +1,16 @@
 //! The limits of the linkage and the claw ([D25](protocol_core::decisions#d25)).
 //!
-//! This file does not know registers or the bus.
+//! This file does not know the register file or the bus.
+
+use protocol_core::registers::map::limit;
 
 use crate::calibration::MicroDegrees;
 
-/// The smallest and the largest sum of the angles of joints 2 and 3: the linkage allows 19 to 161 degrees for joint 3 -
-/// 65 degrees + joint 2.
-const LINKAGE_SUM: (i32, i32) = (84_000_000, 226_000_000);
-/// The largest angle of joint 7: its servo then is at 1023 counts.
-const CLAW_MAX: MicroDegrees = MicroDegrees::from_degrees(84);
+/// The smallest and the largest sum of the angles of joints 2 and 3, in millionths of a degree.
+const LINKAGE_SUM: (i32, i32) =
+    (limit::LINKAGE_SUM.0 as i32 * 1_000_000, limit::LINKAGE_SUM.1 as i32 * 1_000_000);
+/// The largest angle of joint 7.
+const CLAW_MAX: MicroDegrees = MicroDegrees::from_degrees(limit::CLAW_MAX);
 
 /// Does the linkage allow these angles of joints 2 and 3?
 #[must_use]

@@ -7,7 +7,7 @@
 mod rig;
 
 use protocol_core::registers::map::{
-    CHIP_ID, FINE_TARGET, HOST_WATCHDOG, MOTOR_STATE, PRESENT_POSITION, SPEED, TARGET_POSITION,
+    CHIP_ID, FINE_TARGET, HOST_WATCHDOG, LIMITS, MOTOR_STATE, PRESENT_POSITION, SPEED, TARGET_POSITION,
 };
 use protocol_core::time::Duration;
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -400,4 +400,61 @@ fn with_read_only_access_nothing_but_reads_is_sent() {
     let answers: Vec<_> = world.pages[0].answers.iter().map(|(_, answer)| answer.as_str()).collect();
     assert!(answers.iter().all(|answer| answer.contains("read-only")) && answers.len() == 2, "{answers:?}");
     assert_eq!(sharing(&mut world, 0)[4], 2);
+}
+
+/// The maker's `stop`. Returns its answer.
+fn makers_stop(world: &mut World) -> String {
+    world.send_message(0, r#"{"cmd":"stop"}"#);
+    for _ in 0..2_000 {
+        world.run(1);
+        if let Some((_, answer)) = world.pages[0].answers.pop() {
+            return answer;
+        }
+    }
+    panic!("no answer");
+}
+
+#[test]
+fn m11_the_makers_stop_holds_each_joint_and_leaves_those_at_rest() {
+    let mut world = World::new(2);
+    world.join_page();
+    world.run(1_000);
+    let before = look(&mut world).0;
+    (0..10).for_each(|_| assert!(makers_stop(&mut world).contains("Stopped")));
+    assert_eq!(look(&mut world).0, before, "an arm that is stopped again and again does not sink");
+    world.send(0, &write(SPEED.address, &[20; 7]));
+    world.send(0, &write(TARGET_POSITION.address, &[150]));
+    world.run(500);
+    assert!(makers_stop(&mut world).contains("Stopped"));
+    let held = look(&mut world).0;
+    assert_eq!(held[2..], before[2..]);
+    world.run(2_000);
+    assert!(farthest(&held, positions(&mut world)) <= DROOP && positions(&mut world)[0] < 12_000);
+}
+
+#[test]
+fn d25_each_stop_holds_an_arm_whose_joints_are_measured_outside_the_linkage() {
+    for by_maker in [false, true] {
+        let mut world = World::new(2);
+        world.join_page();
+        world.send(0, &write(TARGET_POSITION.address, &[90, 150, 76]));
+        world.run(4_000);
+        world.send(0, &write(SPEED.address, &[10; 7]));
+        world.send(0, &write(LIMITS.address, &[1]));
+        world.send(0, &write(TARGET_POSITION.address, &[10, 76, 150]));
+        world.run(1_000);
+        let measured = positions(&mut world);
+        assert!(measured[1] + measured[2] > 22_600, "outside: {measured:?}");
+        if by_maker {
+            assert!(makers_stop(&mut world).contains("Stopped"));
+        } else {
+            world.send(1, &write(COMMAND, &[1]));
+        }
+        world.run(1_000);
+        let held = positions(&mut world);
+        world.run(2_000);
+        let after = positions(&mut world);
+        assert!(held.iter().zip(after).all(|(held, after)| held.abs_diff(after) < 30), "{held:?} {after:?}");
+        assert!(after[0] > 5_000, "the others hold, too: {after:?}");
+    }
 }

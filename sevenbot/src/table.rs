@@ -107,7 +107,7 @@ pub fn cells(row: &Register) -> [String; 7] {
         row.name.to_owned(),
         region(row.region).to_owned(),
         access(row.access).to_owned(),
-        range(row).map_or_else(|| "-".to_owned(), |(low, high)| format!("{low}..{high}")),
+        range(row).map_or_else(|| "-".to_owned(), |bounds| range_text(row.range, bounds)),
         default(row),
         row.unit.symbol().to_owned(),
     ]
@@ -157,6 +157,13 @@ pub const fn access(access: Access) -> &'static str {
 pub fn range(row: &Register) -> Option<(i32, i32)> {
     let is_any_byte = row.range == Range::UpTo(u8::MAX) && row.access != Access::ReadWrite;
     (!is_any_byte).then(|| row.range.bounds())
+}
+
+fn range_text(range: Range, (low, high): (i32, i32)) -> String {
+    match range {
+        Range::ZeroOr(least, most) => format!("0, {least}..{most}"),
+        _ => format!("{low}..{high}"),
+    }
 }
 
 fn default(row: &Register) -> String {

@@ -30,6 +30,8 @@ pub const TARGET_POSITION: u8 = 46;
 pub const FEEDBACK_FREQUENCY: u8 = 53;
 /// First of seven measured positions.
 pub const PRESENT_POSITION: u8 = 54;
+/// Limits of joint angles: bit 0 the linkage, bit 1 the claw.
+pub const LIMITS: u8 = 188;
 /// First of the sixteen registers of the status block.
 pub const STATUS: u8 = 240;
 /// Fault bits.

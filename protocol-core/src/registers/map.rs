@@ -124,7 +124,7 @@ register_map! {
     FRAMES_CORRUPTED = ram(248).run(2).read_only();
     /// Frames refused: low byte, high byte, wrapping.
     FRAMES_REFUSED = ram(250).run(2).read_only();
-    /// Timeouts and wrong checksums on the servo bus: low byte, high byte, wrapping.
+    /// Questions to servos without an answer, or with a damaged one, since start-up: low byte, high byte, wrapping.
     SERVO_BUS_ERRORS = ram(252).run(2).read_only();
     /// Supply voltage of the servos; 0: unknown.
     SUPPLY_VOLTAGE = ram(254).read_only().unit(Unit::Decivolt);
@@ -209,8 +209,13 @@ pub mod effector {
 pub mod limit {
     /// The linkage of joints 2 and 3.
     pub const LINKAGE: u8 = 1 << 0;
+    /// The smallest and the largest sum of the angles of joints 2 and 3, in degrees: the linkage allows 19 to 161 degrees for
+    /// joint 3 - 65 degrees + joint 2 ([D25](crate::decisions#d25)).
+    pub const LINKAGE_SUM: (u8, u8) = (84, 226);
     /// The claw.
     pub const CLAW: u8 = 1 << 1;
+    /// The largest angle of joint 7, in degrees: its servo then is at 1023 counts.
+    pub const CLAW_MAX: u8 = 84;
 }
 
 /// The values of [`REPORT_CONTENT`].

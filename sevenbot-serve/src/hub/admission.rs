@@ -68,6 +68,18 @@ impl Hub {
         Admission::Queued
     }
 
+    /// Stops the arm for a client, as 1 in register 239 does. [`Hub::hold_outcome`] tells what came of it.
+    pub fn stop_arm(&mut self, now: Instant, id: ClientId) -> Admission {
+        if !self.has_arm() {
+            return Admission::NoArm;
+        }
+        if self.options.is_read_only {
+            return Admission::ReadOnly;
+        }
+        self.obey(now, id, Command::Stop);
+        Admission::Queued
+    }
+
     /// Answers a request while there is no arm: a read of the server's own registers gets a reply, all others are refused.
     fn answer_without_arm(&mut self, now: Instant, id: ClientId, request: &WholeRequest) {
         let reply = self.own_reply(now, id, request);

@@ -10,10 +10,11 @@
 //! off its target: with its position as the new target it would sink by as much in each hold. A joint that still brakes after a stop
 //! or a hold keeps its target, too ([`HeldTargets`]).
 
+use host_link::keep_limits;
 use protocol_core::registers::map::{
-    FINE_POSITION, FINE_TARGET, MISSING_SERVOS, MOVING_JOINTS, PRESENT_POSITION, TARGET_POSITION,
+    FINE_POSITION, FINE_TARGET, LIMITS, MISSING_SERVOS, MOVING_JOINTS, PRESENT_POSITION, TARGET_POSITION,
 };
-use protocol_core::registers::{Joint, Register};
+use protocol_core::registers::{JOINTS, Joint, Register};
 
 use super::held_targets::{HeldTargets, Targets};
 
@@ -110,8 +111,9 @@ impl ArmHold {
         if self.moving.is_none() {
             return Some((MISSING_SERVOS.address, MOVING_JOINTS.address + 1 - MISSING_SERVOS.address));
         }
-        let (targets, positions) = self.rows();
-        Some((targets.address, positions.address + positions.count - targets.address))
+        let last = if self.is_fine { LIMITS } else { PRESENT_POSITION };
+        let first = self.rows().0.address;
+        Some((first, last.address + last.count - first))
     }
 
     /// The registers of the targets and of the positions.
@@ -166,16 +168,24 @@ impl ArmHold {
     /// One frame for each row of joints that get a target.
     fn frames_that_hold(&self, moving: u8, address: u8, values: &[u8], held: &HeldTargets) -> Vec<Frame> {
         let (targets, positions) = self.rows();
-        let mut frames: Vec<Frame> = Vec::new();
-        for joint in Joint::ALL {
-            let target = self.value(values, address, targets.of(joint));
+        let present = Joint::ALL.map(|joint| self.value(values, address, targets.of(joint)));
+        let mut wanted = [None; JOINTS];
+        for ((wanted, target), joint) in wanted.iter_mut().zip(present).zip(Joint::ALL) {
             let position = self.value(values, address, positions.of(joint)).filter(|&at| at != UNMEASURED);
             let kept = match moving & joint.bit() {
                 0 => target,
                 _ => position.and_then(|position| self.held_target(joint, position, target, held)),
             };
             // The points of a stream that are ahead would move a joint which keeps its target.
-            let wanted = kept.map_or(position, |kept| self.is_streaming.then_some(kept));
+            *wanted = kept.map_or(position, |kept| self.is_streaming.then_some(kept));
+        }
+        if self.is_fine {
+            let limits = values.get(usize::from(LIMITS.address.saturating_sub(address))).copied();
+            let present = present.map(Option::unwrap_or_default);
+            keep_limits(limits.unwrap_or_default(), &present, &mut wanted);
+        }
+        let mut frames: Vec<Frame> = Vec::new();
+        for (joint, wanted) in Joint::ALL.into_iter().zip(wanted) {
             let Some(bytes) = wanted.map(|wanted| self.bytes(wanted)) else { continue };
             match frames.last_mut() {
                 Some((first, values))
@@ -238,12 +248,12 @@ mod tests {
     fn joints_that_move_or_are_silent_get_their_positions() {
         let mut hold = hold(0b111_0111, false);
         assert!(!hold.is_over());
-        assert_eq!(hold.next_read(), Some((128, 28)));
+        assert_eq!(hold.next_read(), Some((128, 61)));
         let mut values = values();
         let frames = hold.frames(128, &values, &HeldTargets::default());
         assert_eq!(frames, [(128, vec![21, 22, 23, 24]), (136, vec![27, 28, 29, 30, 31, 32])]);
         assert!(!hold.is_over());
-        assert_eq!(hold.next_read(), Some((128, 28)));
+        assert_eq!(hold.next_read(), Some((128, 61)));
         values[..4].copy_from_slice(&[21, 22, 23, 24]);
         values[8..14].copy_from_slice(&[27, 28, 29, 30, 31, 32]);
         assert_eq!(hold.frames(128, &values, &HeldTargets::default()), []);
@@ -255,7 +265,7 @@ mod tests {
         for (moving, is_confirmed) in [(0b100, false), (0b1, true)] {
             let mut hold = hold(moving, false);
             for _ in 0..2 {
-                assert_eq!(hold.next_read(), Some((128, 28)));
+                assert_eq!(hold.next_read(), Some((128, 61)));
                 let mut values = values();
                 values[..2].copy_from_slice(&[21, 22]);
                 hold.frames(128, &values, &HeldTargets::default());
@@ -276,7 +286,7 @@ mod tests {
     fn d24_joints_that_have_reached_their_targets_keep_them() {
         assert!(hold(0, false).is_over(), "nothing is read or written");
         let mut hold = hold(0, true);
-        assert_eq!(hold.next_read(), Some((128, 28)));
+        assert_eq!(hold.next_read(), Some((128, 61)));
         let frames = hold.frames(128, &values(), &HeldTargets::default());
         assert_eq!(frames, [(128, (1..15).collect())], "the end of a stream that has points left");
     }

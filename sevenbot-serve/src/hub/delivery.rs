@@ -34,10 +34,13 @@ impl Hub {
             }
             (Owner::Hold, _) => self.continue_hold(now, None),
             // A hold that began meanwhile has an outcome of its own.
-            (Owner::MotorState, Event::Reply { values, .. }) if self.hold.is_none() => {
-                let is_on = values.first() == Some(&motor_state::SERVO);
-                self.hold_outcome = Some(if is_on { HoldOutcome::Holds } else { HoldOutcome::Limp });
-            }
+            (Owner::MotorState, event) if self.hold.is_none() => self.end_hold(match event {
+                Event::Reply { values, .. } if values.first() == Some(&motor_state::SERVO) => {
+                    HoldOutcome::Holds
+                }
+                Event::Reply { .. } => HoldOutcome::Limp,
+                _ => HoldOutcome::Unconfirmed,
+            }),
             (Owner::Identity, Event::Reply { values, .. }) => self.identify(now, &values),
             (Owner::Sample(_) | Owner::Identity | Owner::MotorState, _) => {}
         }

@@ -67,6 +67,8 @@ pub enum HoldOutcome {
     Holds,
     /// Its motors are off.
     Limp,
+    /// It has not confirmed the hold: it may be moving.
+    Unconfirmed,
 }
 
 /// What clients may do.
@@ -187,7 +189,7 @@ impl Hub {
         self.hold.is_some()
     }
 
-    /// What the arm has confirmed of the last hold of the hub; `None`: nothing yet.
+    /// What came of the last hold of the hub; `None`: nothing yet.
     #[must_use]
     pub const fn hold_outcome(&self) -> Option<HoldOutcome> {
         self.hold_outcome
@@ -227,6 +229,11 @@ impl Hub {
         self.arm = ArmState::Absent;
         self.forget_arm();
         self.deliver_all(Instant::ZERO);
+    }
+
+    fn end_hold(&mut self, outcome: HoldOutcome) {
+        self.hold_outcome = Some(outcome);
+        self.news.extend(self.clients.keys());
     }
 
     /// Nothing of what was sent or waits may reach the arm that comes next.

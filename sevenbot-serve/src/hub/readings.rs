@@ -4,9 +4,10 @@
 
 use std::collections::VecDeque;
 
+use host_link::keep_limits;
 use host_link::sharing::DROOP;
-use protocol_core::registers::map::{FINE_POSITION, FINE_TARGET, PRESENT_POSITION, TARGET_POSITION};
-use protocol_core::registers::{Joint, Register};
+use protocol_core::registers::map::{FINE_POSITION, FINE_TARGET, LIMITS, PRESENT_POSITION, TARGET_POSITION};
+use protocol_core::registers::{JOINTS, Joint, Register};
 use protocol_core::time::{Duration, Instant};
 
 /// A client may ask again before it writes what it read, so some readings are kept.
@@ -14,7 +15,7 @@ const KEPT: usize = 8;
 /// Older readings tell nothing about where the arm is.
 const FRESH: Duration = Duration::from_millis(1_000);
 /// The value of a fine position that was not measured.
-const UNMEASURED: [u8; 2] = [0xFF; 2];
+const UNMEASURED: u16 = u16::MAX;
 
 /// A reply or a report that holds positions.
 #[derive(Debug)]
@@ -54,29 +55,33 @@ impl Readings {
 }
 
 impl Reading {
-    /// The number of joints whose target in the write is the position of this reading; `None` if one is not.
+    /// The number of joints whose target in the write is the position of this reading; `None` if one is not. A joint may also keep
+    /// the target of this reading, and targets stay within the limits of the arm, as far as the reading has them.
     fn held(&self, targets: &Register, positions: &Register, address: u8, values: &[u8]) -> Option<usize> {
-        let mut count = 0;
-        for joint in Joint::ALL {
-            let Some(target) = bytes(targets, joint, address, values) else { continue };
-            let position = bytes(positions, joint, self.address, &self.values)?;
-            let is_kept = || bytes(targets, joint, self.address, &self.values) == Some(target);
-            if target == UNMEASURED || (target != position && !(is_near(target, position) && is_kept())) {
-                return None;
-            }
-            count += 1;
+        let written = Joint::ALL.map(|joint| value(targets, joint, address, values));
+        let present = Joint::ALL.map(|joint| value(targets, joint, self.address, &self.values));
+        let mut held = [None; JOINTS];
+        for (((held, joint), target), present) in held.iter_mut().zip(Joint::ALL).zip(written).zip(present) {
+            let Some(target) = target else { continue };
+            let position = value(positions, joint, self.address, &self.values)?;
+            let is_kept =
+                positions == &FINE_POSITION && present == Some(target) && target.abs_diff(position) <= DROOP;
+            *held = Some(if is_kept { target } else { position }).filter(|&held| held != UNMEASURED);
         }
-        Some(count)
+        if positions == &FINE_POSITION {
+            let limits =
+                LIMITS.address.checked_sub(self.address).and_then(|at| self.values.get(usize::from(at)));
+            keep_limits(limits.copied().unwrap_or(0), &present.map(Option::unwrap_or_default), &mut held);
+        }
+        (held == written).then(|| written.into_iter().flatten().count())
     }
 }
 
-/// Are these values in hundredths of a degree, and near each other?
-fn is_near(target: &[u8], position: &[u8]) -> bool {
-    match (target, position) {
-        (&[low, high], &[low_too, high_too]) => {
-            u16::from_le_bytes([low, high]).abs_diff(u16::from_le_bytes([low_too, high_too])) <= DROOP
-        }
-        _ => false,
+/// The value of a joint's register in the values from `address` on.
+fn value(row: &Register, joint: Joint, address: u8, values: &[u8]) -> Option<u16> {
+    match bytes(row, joint, address, values)? {
+        &[low, high] => Some(u16::from_le_bytes([low, high])),
+        bytes => bytes.first().copied().map(u16::from),
     }
 }
 
@@ -127,5 +132,21 @@ mod tests {
         assert_eq!(held(&reading(8_900), 8_900), Some(1));
         assert_eq!(held(&reading(8_900), 8_950), None, "neither of them");
         assert_eq!(held(&reading(8_800), 9_000), None, "it is on its way");
+    }
+    #[test]
+    fn d25_a_stop_within_the_limits_is_a_stop() {
+        let mut readings = Readings::default();
+        let (targets, positions) = ([9_000, 7_600, 15_000], [9_500, 12_900, 9_900]);
+        let mut values = vec![0; usize::from(LIMITS.address - 128) + 1];
+        values[..6].copy_from_slice(&targets.map(u16::to_le_bytes).concat());
+        values[14..20].copy_from_slice(&positions.map(u16::to_le_bytes).concat());
+        let held = |readings: &Readings, joint_2: u16| {
+            readings.held_joints(at_ms(0), 128, &[9_500, joint_2, 9_900].map(u16::to_le_bytes).concat())
+        };
+        readings.note(at_ms(0), 128, &values);
+        assert_eq!((held(&readings, 12_900), held(&readings, 12_700)), (Some(3), None));
+        *values.last_mut().unwrap_or(&mut 0) = 1;
+        readings.note(at_ms(0), 128, &values);
+        assert_eq!(held(&readings, 12_700), Some(3), "the sum of joints 2 and 3 is 226 degrees");
     }
 }

@@ -4,7 +4,6 @@ use protocol_core::registers::Map;
 use protocol_core::registers::map::{MOTOR_STATE, OFFSET, SET_POINT_PERIOD, motor_state};
 use protocol_core::time::Instant;
 
-use super::Hub;
 use super::arm_hold::ArmHold;
 use super::client::Waiting;
 use super::client_id::ClientId;
@@ -15,6 +14,7 @@ use super::request::{WholeRequest, read_bytes, without_idle_ends};
 use super::shares::Shares;
 use super::stream::Stream;
 use super::watchdog::{ClientWatchdog, WatchdogAction};
+use super::{HoldOutcome, Hub};
 
 impl Hub {
     /// The watchdog of a client acts.
@@ -75,7 +75,7 @@ impl Hub {
             true if hold.is_confirmed() => {
                 self.line.send_read(now, Owner::MotorState, MOTOR_STATE.address, MOTOR_STATE.count);
             }
-            true => {}
+            true => self.end_hold(HoldOutcome::Unconfirmed),
         }
     }
 

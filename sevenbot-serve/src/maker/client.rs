@@ -6,15 +6,13 @@
 use std::collections::VecDeque;
 
 use protocol_core::registers::Map;
-use protocol_core::registers::map::{
-    FRAMES_REFUSED, MOTOR_STATE, PRESENT_POSITION, TARGET_POSITION, motor_state,
-};
+use protocol_core::registers::map::{FRAMES_REFUSED, MOTOR_STATE, motor_state};
 use protocol_core::time::Instant;
 use serde_json::{Value, json};
 
 use super::block::has_solution;
 use super::command::{MakerCommand, MakerCommandError};
-use crate::hub::{Admission, ClientId, Event, Hub, MOST_WAITING, WholeRequest};
+use crate::hub::{Admission, ClientId, Event, HoldOutcome, Hub, MOST_WAITING, WholeRequest};
 
 /// Answers that may wait for a client to take them. Its commands wait meanwhile.
 const MOST_ANSWERS: usize = 8;
@@ -26,7 +24,7 @@ pub struct MakerClient {
     is_browser: bool,
     /// Each with the time at which it was sent at the earliest.
     waiting: VecDeque<(Instant, Result<MakerCommand, MakerCommandError>)>,
-    /// The command whose read has no reply yet.
+    /// The command that has not ended: its read has no reply yet, or the arm has not confirmed the stop.
     current: Option<MakerCommand>,
     /// The first of two events that the command waits for.
     first: Option<Event>,
@@ -68,7 +66,10 @@ impl MakerClient {
     /// Carries out commands, as far as possible. Call it after messages, after [`Hub::poll`] and [`Hub::arm_bytes`].
     pub fn advance(&mut self, hub: &mut Hub, now: Instant) {
         while let Some(event) = hub.take_event(self.id) {
-            self.finish_read(hub, now, event);
+            self.finish_read(event);
+        }
+        if matches!(self.current, Some(MakerCommand::Stop)) {
+            self.finish_stop(hub);
         }
         while self.current.is_none() && self.answers.len() < MOST_ANSWERS && hub.has_room(self.id) {
             let Some((since, command)) = self.waiting.pop_front() else { return };
@@ -115,15 +116,26 @@ impl MakerClient {
                     refused => self.answer(false, &done_or_refused("", refused)),
                 }
             }
-            Ok(MakerCommand::Stop) => {
-                let (address, count) = (PRESENT_POSITION.address, PRESENT_POSITION.count);
-                hub.request(now, self.id, since, WholeRequest::Read { address, count });
-                self.current = Some(MakerCommand::Stop);
-            }
+            Ok(MakerCommand::Stop) => match hub.stop_arm(now, self.id) {
+                Admission::Queued => self.current = Some(MakerCommand::Stop),
+                refused => self.answer(false, &done_or_refused("", refused)),
+            },
         }
     }
 
-    fn finish_read(&mut self, hub: &mut Hub, now: Instant, event: Event) {
+    /// Ends a stop once the arm holds, or may not.
+    fn finish_stop(&mut self, hub: &Hub) {
+        let answer = match hub.hold_outcome() {
+            Some(HoldOutcome::Holds | HoldOutcome::Limp) => message("Stopped"),
+            Some(HoldOutcome::Unconfirmed) => error("The arm did not confirm the stop: it may be moving"),
+            None if !hub.has_arm() => error("The arm does not answer"),
+            None => return,
+        };
+        self.current = None;
+        self.answer(false, &answer);
+    }
+
+    fn finish_read(&mut self, event: Event) {
         match (self.current.take(), event) {
             (
                 Some(command @ MakerCommand::InverseKinematics { .. }),
@@ -132,10 +144,7 @@ impl MakerClient {
                 None => (self.first, self.current) = (Some(event), Some(command)),
                 Some(before) => self.answer(false, &solution(&before, &event)),
             },
-            (Some(MakerCommand::Stop), Event::Reply { values, .. }) => {
-                let admission = hub.request(now, self.id, now, write(TARGET_POSITION.address, values));
-                self.answer(false, &done_or_refused("Stopped", admission));
-            }
+
             (Some(_), Event::Reply { values, .. }) => {
                 self.answer(true, &json!({"status": "ok", "data": values}))
             }

@@ -72,7 +72,7 @@ impl Class {
         let news = self.shared.with_hub(|hub, _| ArmNews {
             answers: hub.has_arm(),
             is_holding: hub.is_holding(),
-            holds: hub.hold_outcome().is_some(),
+            holds: matches!(hub.hold_outcome(), Some(HoldOutcome::Holds | HoldOutcome::Limp)),
             is_limp: hub.hold_outcome() == Some(HoldOutcome::Limp),
         });
         room.arm_news(now, news);

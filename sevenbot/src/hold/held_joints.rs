@@ -1,7 +1,7 @@
 //! The joints of an arm that has to hold: which targets hold them, and which of these were lost.
 
 use protocol_core::registers::map::{
-    EXTENDED_VERSION, FINE_POSITION, FINE_TARGET, STATUS_VERSION, TARGET_POSITION,
+    EXTENDED_VERSION, FINE_POSITION, FINE_TARGET, LIMITS, STATUS_VERSION, TARGET_POSITION,
 };
 use protocol_core::registers::{Joint, Register};
 
@@ -11,7 +11,7 @@ use crate::fine_angle::FineAngle;
 use crate::joints::{JointSnapshot, frames_for};
 use crate::status_block::StatusBlock;
 use host_link::sharing::DROOP;
-use host_link::{Snapshot, Span};
+use host_link::{Snapshot, Span, keep_limits};
 
 /// A target that was written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -32,7 +32,7 @@ pub struct HeldJoints {
 
 impl HeldJoints {
     /// What an arm with the extended block reads for the second argument of [`Self::new`].
-    pub const FINE_REGISTERS: Span = Span::between(&FINE_TARGET, &FINE_POSITION);
+    pub const FINE_REGISTERS: Span = Span::between(&FINE_TARGET, &LIMITS);
 
     /// From the joints, and on an arm with the extended block a read that holds [`Self::FINE_REGISTERS`].
     #[must_use]
@@ -91,6 +91,9 @@ impl HeldJoints {
                 self.target(joint) == sent.value && !is_measured_now
             });
             *target = self.hold_target(joint, is_past_start_up).filter(|_| !is_done);
+        }
+        if let Some(fine) = &self.fine {
+            keep_limits(fine.byte(&LIMITS), &fine.words(&FINE_TARGET), &mut targets);
         }
         targets
     }
@@ -153,6 +156,7 @@ impl HeldJoints {
 mod tests {
     use super::*;
     use crate::joints::tests::{self, POSE};
+    use protocol_core::registers::map::limit;
 
     const NOTHING_SENT: [Option<SentTarget>; 7] = [None; 7];
 
@@ -234,6 +238,21 @@ mod tests {
         let now = HeldJoints { fine, joints: tests::joint_snapshot(POSE, POSE, 0b1000, 0b1) };
         let held = now.targets_to_write(&NOTHING_SENT, false);
         assert_eq!(held[..5], [Some(8_950), Some(9_000), Some(8_700), Some(8_900), Some(9_000)]);
+    }
+
+    #[test]
+    fn d25_targets_that_hold_stay_within_the_limits() {
+        let targets = [9_000, 7_600, 15_000, 9_000, 9_000, 9_000, 8_000_u16];
+        let positions = [9_500, 12_900, 9_900, 9_000, 9_000, 9_000, 8_000_u16];
+        let mut values: Vec<u8> = targets.into_iter().chain(positions).flat_map(u16::to_le_bytes).collect();
+        values.resize(usize::from(HeldJoints::FINE_REGISTERS.count()), 0);
+        for (limits, joint_2) in [(0, 12_900), (limit::LINKAGE, 12_700)] {
+            values[usize::from(LIMITS.address - FINE_TARGET.address)] = limits;
+            let fine = Some(Snapshot { address: FINE_TARGET.address, values: values.clone() });
+            let now = HeldJoints { fine, joints: tests::joint_snapshot(POSE, POSE, 0, 0b111) };
+            let held = now.targets_to_write(&NOTHING_SENT, false);
+            assert_eq!(held[..3], [Some(9_500), Some(joint_2), Some(9_900)]);
+        }
     }
 
     #[test]

@@ -6,7 +6,8 @@
 //! ```
 //!
 //! On an arm with the extended block, targets are the measured positions in hundredths of a degree, so that a stop moves no
-//! joint; a joint that has reached its target keeps it, so that an arm which is stopped again and again does not sink. On other arms
+//! joint; a joint that has reached its target keeps it, so that an arm which is stopped again and again does not sink, and targets
+//! stay within the limits of register 188, because the arm takes no others ([D25](protocol_core::decisions#d25)). On other arms
 //! they are whole degrees. [`crate::joints`] interprets the registers of each joint.
 //!
 //! [`Hold`] does no input or output. [`Arm::hold`] is the shell for a blocking program; the page in a browser has another.

@@ -9,7 +9,7 @@ use system_tests::arm_control::ArmControl;
 use system_tests::process::{RunningProgram, Signal, send_signal};
 use system_tests::programs::tool;
 use system_tests::registers::{
-    EFFECTOR_TYPE, MOTOR_STATE, PRESENT_POSITION, SPEED, STANDARD_POSE, TARGET_POSITION, TIME,
+    EFFECTOR_TYPE, LIMITS, MOTOR_STATE, PRESENT_POSITION, SPEED, STANDARD_POSE, TARGET_POSITION, TIME,
 };
 use system_tests::started_arm::{ArmKind, StartedArm};
 use system_tests::wait::{wait_for, wait_until};
@@ -74,6 +74,21 @@ fn stop_holds_the_position_of_the_arm() {
         assert_eq!(arm.register(TARGET_POSITION), held);
         arm.wait_until_still();
         arm.wait_until("joint 1 is at rest", |arm| near(arm.register(PRESENT_POSITION), held));
+    });
+}
+
+#[test]
+fn d25_stop_holds_an_arm_whose_joints_are_measured_outside_the_linkage() {
+    with_arm(TestSetup::any(), |arm| {
+        arm.drive_to(&[90, 150, 76, 90, 90, 90, 80]);
+        arm.write(LIMITS, &[1]);
+        // While joint 2 makes room for joint 3, it is measured some degrees behind its set-point.
+        arm.write(SPEED, &[5; 7]);
+        arm.write(TARGET_POSITION, &[10, 76, 150]);
+        arm.wait_until("the arm moves", |arm| arm.register(PRESENT_POSITION) < 86);
+        succeeded(arm.sevenbot(&["stop"]));
+        arm.wait_until_still();
+        assert!(arm.register(PRESENT_POSITION) > 12, "it was not stopped");
     });
 }
 
