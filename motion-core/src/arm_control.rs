@@ -11,8 +11,8 @@
 
 use protocol_core::registers::map::{
     FEEDBACK_FREQUENCY, FRAMES_ACCEPTED, FRAMES_CORRUPTED, HOST_WATCHDOG, LIMITS, MOTOR_STATE, PROTECTION,
-    REPORT_CONTENT, SERVO_BUS_ERRORS, SUPPLY_LOST, SUPPLY_VOLTAGE, VACUUM_PUMP, WATCHDOG_ACTION, fault,
-    motor_state, refusal,
+    REPORT_CONTENT, SERVO_BUS_ERRORS, SET_POINT_PERIOD, SUPPLY_LOST, SUPPLY_VOLTAGE, VACUUM_PUMP,
+    WATCHDOG_ACTION, fault, motor_state, refusal,
 };
 use protocol_core::registers::map21::{ANGLE_FEEDBACK_FREQUENCY, LOAD_FEEDBACK_FREQUENCY, OPTIONS, option};
 use protocol_core::registers::{Accepted, Image, Joint, RegisterFile};
@@ -223,8 +223,10 @@ impl ArmControl {
     fn execute(&mut self, now: Instant, accepted: &Accepted<'_>, changes_settings: bool) {
         // Before the rest of the frame, so that a target in it replaces the measured position (D13).
         self.set_motor_state(accepted);
+        // A new period counts from the next point on (D23), also behind points in its frame.
+        let period = self.registers.word(SET_POINT_PERIOD.address);
         self.apply(accepted, changes_settings);
-        self.joints.set_targets(now, accepted, &mut self.registers);
+        self.joints.set_targets(now, accepted, period, &mut self.registers);
         if let Some(pump) = accepted.value_at(VACUUM_PUMP.address) {
             self.vacuum.set(now, pump != 0);
         }

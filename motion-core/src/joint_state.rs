@@ -216,7 +216,7 @@ impl JointState {
     /// The servo holds no torque: the joint is let go ([D28](protocol_core::decisions#d28)).
     pub(crate) fn lose_torque(&mut self, now: Instant) {
         self.drive.lose_torque(false);
-        self.obstacle = Obstacle::NONE;
+        self.obstacle.forget();
         self.let_go.let_go(now);
     }
 
@@ -288,14 +288,15 @@ impl JointState {
 
     fn fall_silent(&mut self) {
         self.drive.mark_silent();
-        self.obstacle = Obstacle::NONE;
+        self.obstacle.release();
         self.temperature = 0;
         self.alarms = 0;
     }
 
     /// Enters or leaves the servo state: what held or freed the joint before is over.
     pub(crate) fn set_driven(&mut self, is_driven: bool) {
-        (self.obstacle, self.let_go) = (Obstacle::NONE, LetGo::NO);
+        self.obstacle.forget();
+        self.let_go = LetGo::NO;
         self.is_first_engagement = false;
         if is_driven { self.drive.wait() } else { self.drive.release() }
     }
@@ -305,9 +306,14 @@ impl JointState {
         self.let_go.ordered();
     }
 
-    /// Forgets an obstacle: the set-point is free ([D27](protocol_core::decisions#d27)).
-    pub(crate) const fn forget_obstacle(&mut self) {
-        self.obstacle = Obstacle::NONE;
+    /// Forgets an obstacle, because the protection is switched off ([D27](protocol_core::decisions#d27)).
+    pub(crate) fn forget_obstacle(&mut self) {
+        self.obstacle.forget();
+    }
+
+    /// The angles of the joint have changed without a move: its set-point is free ([D27](protocol_core::decisions#d27)).
+    pub(crate) fn release_set_point(&mut self) {
+        self.obstacle.release();
     }
 
     /// Does the set-point give way with the step that it made from `before`, towards the measured position

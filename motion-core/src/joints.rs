@@ -12,8 +12,7 @@
 mod linkage;
 
 use protocol_core::registers::map::{
-    BLOCKED_JOINTS, FINE_TARGET, LET_GO_JOINTS, MEASURED_JOINTS, SERVO_ALARMS, SET_POINT_PERIOD, SPEED,
-    TARGET_POSITION, TIME,
+    BLOCKED_JOINTS, FINE_TARGET, LET_GO_JOINTS, MEASURED_JOINTS, SERVO_ALARMS, SPEED, TARGET_POSITION, TIME,
 };
 use protocol_core::registers::{Accepted, JOINTS, Joint, RegisterFile};
 use protocol_core::time::{Duration, Instant};
@@ -102,11 +101,13 @@ impl Joints {
         self.joints.iter_mut().for_each(JointState::forget_obstacle);
     }
 
-    /// Starts the moves to the targets in a write that was applied, whose frame came at `now`.
+    /// Starts the moves to the targets in a write that was applied, whose frame came at `now`. `period` is the set-point period
+    /// before it, in milliseconds.
     pub(crate) fn set_targets(
         &mut self,
         now: Instant,
         accepted: &Accepted<'_>,
+        period: u16,
         registers: &mut RegisterFile,
     ) {
         for (joint, state) in self.each_mut() {
@@ -115,15 +116,21 @@ impl Joints {
             }
         }
         if accepted.is_extended() {
-            self.set_fine_targets(now, accepted, registers);
+            self.set_fine_targets(now, accepted, period, registers);
         }
     }
 
-    fn set_fine_targets(&mut self, now: Instant, accepted: &Accepted<'_>, registers: &mut RegisterFile) {
+    fn set_fine_targets(
+        &mut self,
+        now: Instant,
+        accepted: &Accepted<'_>,
+        period: u16,
+        registers: &mut RegisterFile,
+    ) {
         for (joint, state) in self.each_mut() {
             let Some(centidegrees) = accepted.word_at(FINE_TARGET.of(joint)) else { continue };
             let angle = MicroDegrees::from_centidegrees(centidegrees);
-            match registers.word(SET_POINT_PERIOD.address) {
+            match period {
                 0 => state.approach(angle, registers.get(TIME.of(joint)), registers),
                 millis => state.stream_to(now, angle, Duration::from_millis(millis.into()), registers),
             }
@@ -148,7 +155,7 @@ impl Joints {
                 let counts = counts_from_angle(joint, state.drive.set_point(), before);
                 let set_point = angle_from_counts(joint, counts, offset);
                 state.drive.rebase_offset(set_point, state.target(), registers.get(TIME.of(joint)));
-                state.forget_obstacle();
+                state.release_set_point();
             }
         }
     }

@@ -29,8 +29,8 @@ impl LimitCheck<'_> {
         self.accepted.value_at(LIMITS.address).unwrap_or(self.limits)
     }
 
-    /// The first register because of which the write is refused. `targets` holds the targets of a write that writes none,
-    /// `set_points` the set-points of the driven joints.
+    /// The lowest register for which a limit refuses the write. `targets` are the targets before the write, and `set_points` the
+    /// set-points of the driven joints.
     pub(crate) fn first_refused(&self, targets: &Angles, set_points: &Angles) -> Option<u8> {
         let mut after = *targets;
         for (target, joint) in after.iter_mut().zip(Joint::ALL) {

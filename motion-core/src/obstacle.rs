@@ -40,6 +40,18 @@ impl Obstacle {
     pub(crate) const NONE: Self =
         Self { limiter: PushLimiter::FREE, held: None, is_blocked: false, retrying_since: None };
 
+    /// The set-point is free. A blocked joint stays blocked until the next target for it.
+    #[inline(never)]
+    pub(crate) fn release(&mut self) {
+        *self = Self { is_blocked: self.is_blocked, ..Self::NONE };
+    }
+
+    /// Nothing is in the way any more.
+    pub(crate) fn forget(&mut self) {
+        self.is_blocked = false;
+        self.release();
+    }
+
     /// Was the set-point held back in the last control cycle?
     pub(crate) const fn is_holding_back(&self) -> bool {
         self.held.is_some()

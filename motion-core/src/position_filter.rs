@@ -21,10 +21,10 @@ const FRESH_FOR: Duration = Duration::from_millis(20);
 /// The highest speed of a joint: 372 degrees/s ([D10](protocol_core::decisions#d10)) are 1757 counts per second. A hand can
 /// be slightly faster.
 const COUNTS_PER_SECOND: u32 = 2_000;
-/// A joint that sinks this slowly counts as steady, or a servo that is seldom asked would not catch its joint before it
-/// lies at the bottom.
+/// A joint that sinks this slowly counts as steady: otherwise a servo that is seldom read would engage only when its joint lies at
+/// the bottom.
 const SINKING_COUNTS_PER_SECOND: u32 = 60;
-/// So old a reading says the least about a joint that sinks: 15 counts more.
+/// The allowance for sinking grows up to this age of a reading, to 15 counts.
 const SINKS_FOR_MILLIS: u32 = 250;
 /// After a longer pause a false position is within reach of the previous answer, and so far away that a joint whose set-point
 /// follows it would jump.

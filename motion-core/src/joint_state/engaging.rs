@@ -8,7 +8,6 @@ use protocol_core::time::Instant;
 use super::JointState;
 use crate::calibration::{MicroDegrees, angle_from_counts, counts_from_angle};
 use crate::drive::{Target, is_near};
-use crate::obstacle::Obstacle;
 use crate::servo_bus::Answer;
 use crate::torque_check::{TorqueCheck, TorqueFound};
 
@@ -97,7 +96,7 @@ impl JointState {
         self.let_go.engaged(now);
         self.torque = TorqueCheck::ORDERED;
         self.goal.begin(was_silent);
-        self.obstacle = Obstacle::NONE;
+        self.obstacle.release();
         if target == Target::Measured {
             self.set_target(angle, registers);
         }

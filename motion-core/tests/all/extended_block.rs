@@ -123,6 +123,24 @@ fn d23_a_fine_target_that_came_before_a_control_cycle_goes_out_with_its_goals() 
 }
 
 #[test]
+fn d23_a_new_period_does_not_count_for_the_points_before_it_in_its_frame() {
+    let mut rig = Rig::started();
+    rig.write(32, &[0; 7]);
+    // 5 s.
+    rig.write(39, &[50; 7]);
+    let mut frame = fine(&[12_000, 9_000, 6_500, 9_000, 9_000, 9_000, 8_000]);
+    frame.resize(56, 0);
+    frame.extend([20, 0]);
+    rig.write(FINE_TARGET, &frame);
+    rig.run_ms(1_000);
+    let present = rig.present()[0];
+    assert!((94..=98).contains(&present), "after a fifth of the time: {present}");
+    rig.write(FINE_TARGET, &fine(&[9_600]));
+    rig.run_ms(300);
+    assert_eq!(rig.present()[0], 96, "the next one is a point of a stream");
+}
+
+#[test]
 fn d23_a_stream_ends_with_a_coarse_target_and_stops_at_its_last_point() {
     let mut rig = Rig::started();
     rig.write(PERIOD, &20_u16.to_le_bytes());

@@ -2,6 +2,7 @@
 
 use crate::rig::Rig;
 use arm_sim::plant::Thing;
+use arm_sim::servo::ServoFault;
 use motion_core::calibration::{MicroDegrees, counts_from_angle};
 use protocol_core::registers::Joint;
 
@@ -253,4 +254,26 @@ fn d27_a_stream_that_ended_at_an_obstacle_does_not_go_on_when_it_leaves() {
     assert!(rig.plant.angle(joint) < 104_000, "{}", rig.plant.angle(joint));
     stream(&mut rig, 1, (0..50).map(|_| 12_000));
     assert_eq!((rig.get(BLOCKED), rig.present()[0]), (0, 120), "the next point goes on");
+}
+
+#[test]
+fn d27_a_blocked_joint_whose_servo_was_silent_stays_blocked_until_the_next_target() {
+    let (mut rig, joint) = (Rig::started(), joint(1));
+    rig.plant.set_wall(joint, stiff_wall(100));
+    rig.write(46, &[130]);
+    rig.run_ms(2_500);
+    assert_eq!(rig.get(BLOCKED), bit(1));
+    rig.plant.set_fault(joint, Some(ServoFault::Garbled(1)));
+    rig.run_ms(300);
+    assert_eq!((rig.get(BLOCKED), rig.get(242)), (bit(1), bit(1)), "silent");
+    rig.plant.set_fault(joint, None);
+    rig.run_ms(1_000);
+    assert_eq!((rig.get(BLOCKED), rig.get(242), rig.get(LET_GO)), (bit(1), 0, 0));
+    rig.write(28, &[0]);
+    rig.write(13, &[1]);
+    rig.run_ms(100);
+    assert_eq!(rig.get(BLOCKED), bit(1), "another offset is no target");
+    rig.write(46, &[80]);
+    rig.run_ms(1_000);
+    assert_eq!(rig.get(BLOCKED), 0);
 }
