@@ -54,7 +54,7 @@ pub enum SessionEvent {
 pub struct Entry {
     /// When it happened.
     pub now: Instant,
-    /// What happened.
+    /// The event of this line.
     pub event: SessionEvent,
 }
 

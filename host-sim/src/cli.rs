@@ -60,7 +60,7 @@ pub struct Options {
     #[arg(long, value_name = "PATH", conflicts_with_all = ["servos", "servos_only", "servo_socket"])]
     pub control: Option<PathBuf>,
 
-    /// Let virtual time stand while the client thinks: see LOCKSTEP below. MS is a time-out in real time
+    /// Let virtual time stand while the client thinks: see LOCKSTEP below. MS is a timeout in real time
     #[arg(long, value_name = "MS", value_parser = clap::value_parser!(u32).range(1..=86_400_000),
           conflicts_with_all = ["arms", "servos", "servos_only", "servo_socket"])]
     pub lockstep: Option<u32>,

@@ -43,7 +43,7 @@ LOCKSTEP
   Virtual time goes on only while a byte is on the host line. Then it stands
   until the client sends its next byte: the same client gets the same bytes in
   every run, however long it thinks. After MS without a byte, time goes on by 1
-  ms. A client that sleeps, or that waits for reports, waits for this time-out.
+  ms. A client that sleeps, or that waits for reports, waits for this timeout.
 
 FAULTS
 {FAULTS_HELP}

@@ -42,9 +42,7 @@ impl SnapshotError {
         match self {
             Self::Name => "a short word, as 'before'",
             Self::Full => "use the name of one of them, which is replaced",
-            Self::Unknown { .. } => {
-                "{\"do\":\"snapshot\",\"name\":\"before\"} keeps one, until the simulator ends"
-            }
+            Self::Unknown { .. } => "`sevenbot sim snapshot NAME` keeps one, until the simulator ends",
             Self::Settings(_) => "is the file of --eeprom writable?",
         }
     }

@@ -7,7 +7,7 @@
 //! | max | goes from event to event without sleeping |
 //! | paused | stands |
 //! | advance | goes from event to event until its end, then the mode before continues |
-//! | lockstep | goes from event to event while a byte is on the host line, and stands otherwise; after each time-out of real time without a byte it goes on by a millisecond |
+//! | lockstep | goes from event to event while a byte is on the host line, and stands otherwise; after each timeout of real time without a byte it goes on by a millisecond |
 
 use protocol_core::time::{Duration, Instant};
 use rustix::event::Timespec;
@@ -16,7 +16,7 @@ use crate::clock::{RealClock, sleep_until};
 
 /// Virtual time never goes on by more than this at once, so that the port is served in between.
 const LONGEST_STEP: Duration = Duration::from_millis(1_000);
-/// In lockstep, virtual time goes on by this after a time-out.
+/// In lockstep, virtual time goes on by this after a timeout.
 const LOCKSTEP_TICK: Duration = Duration::from_millis(1);
 /// The slowest and the fastest factor, in thousandths.
 const FACTORS: core::ops::RangeInclusive<u32> = 1..=1_000_000;
@@ -51,7 +51,7 @@ pub struct VirtualClock {
 #[derive(Debug)]
 struct ClientLockstep {
     timeout: Duration,
-    /// The real time of the last byte on the host line, or of the last time-out.
+    /// The real time of the last byte on the host line, or of the last timeout.
     since: Instant,
 }
 
@@ -314,7 +314,7 @@ mod tests {
         assert_eq!(sleep_micros(&clock, at(1_050), false), 50_000);
         assert_eq!(clock.tick_at(at(60), at(1_002), true), at(1_002));
         assert_eq!(clock.tick_at(at(159), at(1_010), false), at(1_002));
-        assert_eq!(clock.tick_at(at(160), at(1_010), false), at(1_003), "the time-out");
+        assert_eq!(clock.tick_at(at(160), at(1_010), false), at(1_003), "the timeout");
         assert_eq!(clock.tick_at(at(161), at(1_010), false), at(1_003));
         assert_eq!(clock.set_speed(TimeSpeed::Max), Err(FollowsClient));
         clock.advance(Duration::from_millis(5));

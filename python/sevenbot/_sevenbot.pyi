@@ -412,7 +412,7 @@ class Arm:
 
         Returns the targets in degrees. If the motors are off, writes nothing. Raises `ArmProblem` if a joint is silent or has let
         go, the servos have no supply, or the controller restarted; the other joints hold. Raises `MayMove` if the arm does not
-        answer.
+        answer, or if something drags a joint further than 10 degrees from its target.
         """
     def status(self) -> Status | None:
         """The health of the arm: each joint, alarms, supply, and what needs attention. `None` if the firmware does not tell, as
@@ -436,7 +436,7 @@ class Arm:
         table: float | None = None,
         guard: bool = True,
     ) -> Stream:
-        """A stream of set-points, one each `period` seconds, 0.005 to 1: a context manager.
+        """A stream of set-points, one each `period` seconds, 0.005 to 1: a context manager. An arm has one open stream at a time.
 
         If the program sends nothing for `watchdog` seconds, 0.01 to 2.55 or 0 for never, the arm holds; with `damping` it
         sinks slowly. Needs this project's firmware, or raises `NotServed`. `approach`: seconds to go smoothly to the first
@@ -481,7 +481,7 @@ class Arm:
         threads run meanwhile, and do not delay the reads.
         """
     def close(self) -> None:
-        """Closes the port. The arm goes on with its move: `stop()` makes it hold."""
+        """Closes the port. The arm goes on with its move: `stop()` makes it hold. Calls of other threads end as with `stop()`."""
     def __enter__(self) -> Self: ...
     def __exit__(
         self,
@@ -546,7 +546,7 @@ class SimulatedArms:
     def exchange(
         self, measured: ArrayLike, dt: float = 0.002, out: None = None
     ) -> NDArray[float64]:
-        """Lets another simulation move the joints, such as MuJoCo: tells each arm what that one measured, lets `dt` pass, and returns
+        """Lets another simulation, such as MuJoCo, move the joints: passes its measurements to the arms, lets `dt` pass, and returns
         what the servos want then.
 
         `measured` is an array (n, 21) with the columns `POSITIONS`, `VELOCITIES` and `LOADS`, in the units of an observation. A
@@ -705,6 +705,15 @@ class Observation:
     @property
     def monotonic(self) -> float:
         """When the answer was here, on the clock of `time.monotonic()`."""
+    @staticmethod
+    def _of(
+        positions: Iterable[float],
+        velocities: Iterable[float],
+        loads: Iterable[float],
+        time: float,
+        age: float,
+        monotonic: float,
+    ) -> Observation: ...
 
 @final
 class Problem:
@@ -718,6 +727,8 @@ class Problem:
     @property
     def remedy(self) -> str:
         """What to do."""
+    @staticmethod
+    def _of(kind: str, joint: int | None) -> Problem: ...
 
 @final
 class JointStatus:
@@ -755,6 +766,8 @@ class JointStatus:
     @property
     def state(self) -> str:
         """What the joint does, in a word or two; empty if the motors are off."""
+    @staticmethod
+    def _of_registers(registers: bytes, joint: int) -> JointStatus: ...
 
 @final
 class Status:
@@ -843,7 +856,8 @@ class Stream:
 
         The first point of a joint has to be within 5 degrees of where it stands, and is approached at up to 30 degrees per
         second; else `TooFar` is raised, unless the stream has an `approach`. Then the call takes that time. The first point below
-        the table or in the base gives a `GuardWarning`. After `Simulation.restore` the next point is a first one again.
+        the table or in the base gives a `GuardWarning`. After `Simulation.restore`, and after a failure of the whole arm, such as a
+        restart, the next point is a first one again.
         """
     def latest(self, angles: _Goals) -> StreamCounts:
         """Offers an action, and does not wait: seven angles, as for `send`; `None` keeps that of the action before.
@@ -882,6 +896,8 @@ class StreamCounts:
     @property
     def watchdog(self) -> int:
         """How often the program was silent until the watchdog of the arm acted."""
+    @staticmethod
+    def _of(sent: int, skipped: int, repeated: int, missed: int, watchdog: int) -> StreamCounts: ...
 
 @final
 class Recording:

@@ -33,6 +33,7 @@ class Arm:
         """Wraps an open arm, which no other code may use meanwhile."""
         self.sync = arm
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="sevenbot")
+        self._is_closed = False
 
     @classmethod
     async def open(cls, port: str | None = None, **options: Any) -> Arm:
@@ -71,6 +72,22 @@ class Arm:
     async def angles(self) -> _Angles:
         """The measured angles in degrees."""
         return await self._call(lambda: self.sync.angles)
+
+    async def is_connected(self) -> bool:
+        """As `sevenbot.Arm.is_connected`. Does not wait for the calls before."""
+        return await asyncio.to_thread(lambda: self.sync.is_connected)
+
+    def registers(self) -> Awaitable[dict[str, Any]]:
+        """The names and the values of all registers, as `dict(sevenbot.Arm.registers)`."""
+        return self._call(lambda: dict(self.sync.registers))
+
+    def torque_on(self) -> Awaitable[None]:
+        """As `sevenbot.Arm.torque_on`."""
+        return self._call(self.sync.torque_on)
+
+    def torque_off(self) -> Awaitable[None]:
+        """As `sevenbot.Arm.torque_off`."""
+        return self._call(self.sync.torque_off)
 
     def get(self, name: str) -> Awaitable[Any]:
         """As `sevenbot.Arm.get`."""
@@ -163,6 +180,7 @@ class Arm:
     async def close(self) -> None:
         """Closes the port. The arm goes on with its move."""
         await asyncio.to_thread(self.sync.close)
+        self._is_closed = True
         self._thread.shutdown(wait=False)
 
     async def __aenter__(self) -> Arm:
@@ -170,8 +188,9 @@ class Arm:
 
     async def __aexit__(self, *exception: Any) -> None:
         """Stops what moves, and closes the port."""
-        await self._call(self.sync.__exit__, *exception)
-        self._thread.shutdown(wait=False)
+        if not self._is_closed:
+            await self._call(self.sync.__exit__, *exception)
+            await self.close()
 
 
 class Stream:

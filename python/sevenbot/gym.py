@@ -22,10 +22,11 @@ from typing import Any, ClassVar
 
 import gymnasium
 import numpy as np
+from gymnasium.utils.seeding import np_random
 from gymnasium.vector import AutoresetMode, VectorEnv
 from numpy.typing import NDArray
 
-from sevenbot import SimulatedArms, forward
+from sevenbot import InvalidValue, SimulatedArms, forward
 
 __all__ = ["ReachEnv", "ReachVectorEnv", "TrackEnv", "TrackVectorEnv", "sample_goal"]
 
@@ -73,8 +74,7 @@ class _Arms:
 
     def reset(self, random: np.random.Generator, mask: Flags, goals: Floats | None = None) -> None:
         """Begins episodes of the arms of the mask."""
-        seeds = random.integers(0, 2**63, self.count)
-        self.arms.reset(mask, seeds=seeds.tolist())
+        self.arms.reset(mask, seeds=self.draw(random, mask, 2**63).tolist())
         self.targets[mask], self.steps[mask], self.delays[mask] = REST, 0, 0
         self.waiting[:, mask] = 0
         drawn = [sample_goal(random) for _ in range(mask.sum())] if goals is None else goals[mask]
@@ -84,14 +84,25 @@ class _Arms:
         self.arms.observe(self.seen)
 
     def disturb(self, random: np.random.Generator, mask: Flags) -> None:
-        self.delays[mask] = random.integers(0, MOST_DELAY + 1, mask.sum())
-        self.arms.set_load(random.integers(0, 201, self.count), mask)
-        chosen = random.integers(0, 2 * len(FAULTS), self.count)
+        self.delays[mask] = self.draw(random, mask, MOST_DELAY + 1)[mask]
+        self.arms.set_load(self.draw(random, mask, 201), mask)
+        chosen = self.draw(random, mask, 2 * len(FAULTS))
         for number, fault in enumerate(FAULTS):
             self.arms.fault(mask & (chosen == number), fault)
 
+    def draw(self, random: np.random.Generator, mask: Flags, end: int) -> NDArray[np.int64]:
+        """A random number below `end` for each arm of the mask, and 0 for the others."""
+        drawn = np.zeros(self.count, dtype=np.int64)
+        drawn[mask] = random.integers(0, end, mask.sum())
+        return drawn
+
     def step(self, actions: Floats) -> tuple[Floats, Flags]:
         """Rewards, and which tips are near their goals."""
+        # A wrong action would stay in the targets, also after the step that fails.
+        if not np.isfinite(actions).all():
+            raise InvalidValue("an action is not finite: NaN or an infinity")
+        if actions.shape != (self.count, JOINTS):
+            raise InvalidValue(f"actions: the shape is {actions.shape}: use ({self.count}, {JOINTS})")
         self.waiting = np.roll(self.waiting, 1, axis=0)
         self.waiting[0] = np.clip(actions, -1, 1)
         due = self.waiting[self.delays, np.arange(self.count)]
@@ -198,6 +209,7 @@ class _ArmVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
         self.max_episode_steps = max_episode_steps
         self._arms = _Arms(num_envs, is_moving=self.is_moving, disturbed=disturbed, threads=threads)
         self._ended = np.zeros(num_envs, dtype=np.bool_)
+        self._own_random: list[np.random.Generator] = []
         self.single_observation_space = self._arms.observation_space
         self.single_action_space = self._arms.action_space
         batch = gymnasium.vector.utils.batch_space
@@ -207,13 +219,31 @@ class _ArmVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
     def reset(
         self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Floats, dict[str, Any]]:
-        """Begins an episode of each arm. `options={"goals": array}` sets the goals, (n, 3) in millimetres."""
-        super().reset(seed=seed if isinstance(seed, int) or seed is None else seed[0])
+        """Begins an episode of each arm. `options={"goals": array}` sets the goals, (n, 3) in millimetres.
+
+        All arms draw from one seed. With a list of n seeds each arm draws from its own, as one environment does; `None` in it is
+        a random seed. Without a seed the random numbers go on.
+        """
+        if isinstance(seed, (int, np.integer)):
+            super().reset(seed=int(seed))
+            self._own_random = []
+        elif seed is not None:
+            if len(seed) != self.num_envs:
+                raise InvalidValue(f"seed: here are {len(seed)}: use one whole number, or one for each of {self.num_envs} arms")
+            numbers = [None if one is None else int(one) for one in seed]
+            self._own_random = [np_random(number)[0] for number in numbers]
         goals = (options or {}).get("goals")
         everything = np.ones(self.num_envs, dtype=np.bool_)
         self._ended[:] = False
-        self._arms.reset(self.np_random, everything, None if goals is None else np.asarray(goals, np.float32))
+        self._begin(everything, None if goals is None else np.asarray(goals, np.float32))
         return self._arms.observations(), {}
+
+    def _begin(self, mask: Flags, goals: Floats | None = None) -> None:
+        if not self._own_random:
+            self._arms.reset(self.np_random, mask, goals)
+            return
+        for arm in np.flatnonzero(mask):
+            self._arms.reset(self._own_random[arm], np.arange(self.num_envs) == arm, goals)
 
     def step(
         self, actions: Floats
@@ -222,7 +252,7 @@ class _ArmVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
         begun = self._ended
         rewards, near = self._arms.step(np.asarray(actions, dtype=np.float32))
         if begun.any():
-            self._arms.reset(self.np_random, begun)
+            self._begin(begun)
             rewards[begun], near[begun] = 0, False
         self._ended = self._arms.steps >= self.max_episode_steps
         never = np.zeros(self.num_envs, dtype=np.bool_)

@@ -23,7 +23,7 @@ impl<'py> FromPyObject<'_, 'py> for Goals {
 
     fn extract(angles: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
         let py = angles.py();
-        let elements = elements(&angles, 7).ok_or_else(|| InvalidType::raise(py, WHAT_ANGLES))?;
+        let elements = elements(&angles, 7)?.ok_or_else(|| InvalidType::raise(py, WHAT_ANGLES))?;
         if elements.len() != 7 {
             return Err(InvalidType::raise(py, &format!("{WHAT_ANGLES}: here are {}", elements.len())));
         }
@@ -58,7 +58,7 @@ impl Goals {
     /// All seven angles in degrees, each 0 to 180.
     pub(crate) fn all(&self, py: Python<'_>) -> PyResult<[f64; 7]> {
         let [Some(a), Some(b), Some(c), Some(d), Some(e), Some(f), Some(g)] = self.targets(py)? else {
-            return Err(InvalidType::raise(py, "here each joint needs an angle"));
+            return Err(InvalidType::raise(py, "None is not allowed here: give all seven angles"));
         };
         Ok([a, b, c, d, e, f, g].map(FineAngle::degrees))
     }
@@ -87,7 +87,7 @@ impl<'py> FromPyObject<'_, 'py> for Direction {
 
     fn extract(direction: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
         let numbers: Option<Vec<f64>> =
-            elements(&direction, 3).and_then(|elements| elements.iter().map(real).collect());
+            elements(&direction, 3)?.and_then(|elements| elements.iter().map(real).collect());
         match numbers.as_deref() {
             Some([x, y, z]) => Ok(Self(Vector::new(*x, *y, *z))),
             _ => Err(InvalidType::raise(direction.py(), "tool is a direction of three numbers: x, y and z")),

@@ -326,7 +326,7 @@ impl Arm {
         Ok((bulk::numbers(py, &times)?, bulk::angles(py, &rows)?))
     }
 
-    /// Closes the port. The arm goes on with its move: `stop()` makes it hold.
+    /// Closes the port. The arm goes on with its move: `stop()` makes it hold. Calls of other threads end as with `stop()`.
     fn close(&self, py: Python<'_>) {
         self.worker.close(py);
     }

@@ -167,7 +167,7 @@ impl SimulatedArms {
         sent.map_err(|error| InvalidValue::raise(py, &error.to_string()))
     }
 
-    /// Lets another simulation move the joints, such as MuJoCo: tells each arm what that one measured, lets `dt` pass, and returns
+    /// Lets another simulation, such as MuJoCo, move the joints: passes its measurements to the arms, lets `dt` pass, and returns
     /// what the servos want then.
     ///
     /// `measured` is an array (n, 21) with the columns `POSITIONS`, `VELOCITIES` and `LOADS`, in the units of an observation. A

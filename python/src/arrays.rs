@@ -46,7 +46,7 @@ pub(crate) fn given<'py, T: Element>(
     if array.shape() != shape {
         return Err(wrong_shape(&array, shape, what));
     }
-    array.try_readonly().map_err(|_| in_use(py))
+    array.try_readonly().map_err(|_| in_use(py, what))
 }
 
 /// The array `out`, which is filled itself; a new one if there is none.
@@ -64,11 +64,11 @@ pub(crate) fn out<'py, T: Element>(
     if array.shape() == shape { Ok(array.clone()) } else { Err(wrong_shape(array, shape, "out")) }
 }
 
-/// An array that is written.
+/// The array `out` while it is written.
 pub(crate) fn writing<'py, T: Element>(
     array: &Bound<'py, PyArray2<T>>,
 ) -> PyResult<PyReadwriteArray2<'py, T>> {
-    array.try_readwrite().map_err(|_| in_use(array.py()))
+    array.try_readwrite().map_err(|_| in_use(array.py(), "out"))
 }
 
 fn wrong_shape(object: &Bound<'_, PyAny>, [rows, columns]: Shape, what: &str) -> PyErr {
@@ -77,16 +77,14 @@ fn wrong_shape(object: &Bound<'_, PyAny>, [rows, columns]: Shape, what: &str) ->
     InvalidValue::raise(object.py(), &text)
 }
 
-fn in_use(py: Python<'_>) -> PyErr {
-    InvalidValue::raise(
-        py,
-        "an array is read-only, is both argument and result, or is used by another thread",
-    )
+fn in_use(py: Python<'_>, what: &str) -> PyErr {
+    let reasons = "the array is read-only, is both argument and result, or is used by another thread";
+    InvalidValue::raise(py, &format!("{what}: {reasons}: pass a copy, array.copy()"))
 }
 
 /// An array without gaps has a slice.
 pub(crate) fn gaps<E>(py: Python<'_>) -> impl Fn(E) -> PyErr {
-    move |_| InvalidValue::raise(py, "an array has gaps")
+    move |_| InvalidValue::raise(py, "an array has gaps: use numpy.ascontiguousarray")
 }
 
 /// A mask of all arms: `None`, or as many truth values as there are arms.
@@ -96,7 +94,7 @@ pub(crate) fn mask(object: Option<&Bound<'_, PyAny>>, count: usize) -> PyResult<
     let wrong = || InvalidType::raise(py, &format!("mask: use {count} truth values, or None for all arms"));
     let array = numpy(py)?.call_method1("asarray", (object,)).map_err(|_| wrong())?;
     let array = array.cast_into::<PyArray1<bool>>().map_err(|_| wrong())?;
-    let chosen = array.try_readonly().map_err(|_| in_use(py))?.as_array().to_vec();
+    let chosen = array.try_readonly().map_err(|_| in_use(py, "mask"))?.as_array().to_vec();
     if chosen.len() == count { Ok(Some(chosen)) } else { Err(wrong()) }
 }
 
@@ -122,7 +120,7 @@ pub(crate) fn seeds(
 ) -> PyResult<Vec<u64>> {
     if let Some(each) = each {
         let wrong = || InvalidType::raise(each.py(), &format!("seeds: use {count} whole numbers"));
-        let each = elements(each, count).filter(|each| each.len() == count).ok_or_else(wrong)?;
+        let each = elements(each, count)?.filter(|each| each.len() == count).ok_or_else(wrong)?;
         return each.iter().map(seed).collect();
     }
     let first = first.map_or(Ok(1), seed)?;

@@ -69,7 +69,17 @@ impl NotServed {
 impl Closed {
     /// The exception of a call after `close()`.
     pub(crate) fn raise_closed(py: Python<'_>) -> PyErr {
-        error::<Self>(py, "the arm is closed, or no stream is open", &[])
+        error::<Self>(py, "the arm is closed: open it again", &[])
+    }
+
+    /// The exception of a call for a stream that is not open.
+    pub(crate) fn raise_no_stream(py: Python<'_>) -> PyErr {
+        error::<Self>(py, "this stream is not open: use `with arm.stream() as stream:`", &[])
+    }
+
+    /// The exception of a stream that does not begin: the arm has another one.
+    pub(crate) fn raise_other_stream(py: Python<'_>) -> PyErr {
+        error::<Self>(py, "this arm has an open stream already: a second one can begin after its end", &[])
     }
 
     /// The exception in a process that was forked off.

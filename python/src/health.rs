@@ -1,8 +1,14 @@
 //! `JointStatus` and `Problem`: what a joint does, what is wrong, and what to do.
 
 use pyo3::prelude::*;
-use sevenbot::health::JointHealth;
-use sevenbot::{FineAngle, Joint};
+use pyo3::types::PyBytes;
+use sevenbot::health::{Health, JointHealth, ProblemKind};
+use sevenbot::{FineAngle, Joint, Snapshot};
+
+use crate::errors::InvalidValue;
+
+/// The arguments of [`Problem::_of`].
+type PickledProblem = (&'static str, Option<u8>);
 
 /// Something that is wrong with the arm or one of its joints.
 #[pyclass(frozen, module = "sevenbot")]
@@ -34,6 +40,18 @@ impl Problem {
         self.0.kind.remedy()
     }
 
+    /// From the kind and the joint: what `pickle` calls.
+    #[staticmethod]
+    fn _of(py: Python<'_>, kind: &str, joint: Option<u8>) -> PyResult<Self> {
+        let kind = ProblemKind::ALL.into_iter().find(|each| each.name() == kind);
+        let kind = kind.ok_or_else(|| InvalidValue::raise(py, "there is no problem of this kind"))?;
+        Ok(Self(sevenbot::Problem { kind, joint: joint.and_then(Joint::new) }))
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, PickledProblem)> {
+        Ok((py.get_type::<Self>().getattr("_of")?, (self.kind(), self.joint())))
+    }
+
     fn __str__(&self) -> String {
         self.0.to_string()
     }
@@ -48,13 +66,18 @@ impl Problem {
 pub(crate) struct JointStatus {
     health: JointHealth,
     is_driven: bool,
+    /// Registers 0 to 255, of which the rest is made.
+    registers: Vec<u8>,
 }
 
 impl JointStatus {
-    pub(crate) const fn of(health: JointHealth, is_driven: bool) -> Self {
-        Self { health, is_driven }
+    pub(crate) const fn of(health: JointHealth, is_driven: bool, registers: Vec<u8>) -> Self {
+        Self { health, is_driven, registers }
     }
 }
+
+/// The arguments of [`JointStatus::_of_registers`].
+type PickledJoint<'py> = (Bound<'py, PyBytes>, u8);
 
 #[pymethods]
 impl JointStatus {
@@ -122,6 +145,20 @@ impl JointStatus {
     #[getter]
     fn state(&self) -> String {
         self.health.word(self.is_driven)
+    }
+
+    /// From registers 0 to 255 and the joint: what `pickle` calls.
+    #[staticmethod]
+    fn _of_registers(py: Python<'_>, registers: Vec<u8>, joint: u8) -> PyResult<Self> {
+        let health = Health::new(&Snapshot { address: 0, values: registers.clone() });
+        let found = health.joints.iter().find(|each| each.joint.number() == joint);
+        let found = found.ok_or_else(|| InvalidValue::raise(py, "a joint is 1 to 7"))?;
+        Ok(Self::of(*found, health.is_driven(), registers))
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, PickledJoint<'py>)> {
+        let arguments = (PyBytes::new(py, &self.registers), self.joint());
+        Ok((py.get_type::<Self>().getattr("_of_registers")?, arguments))
     }
 
     fn __repr__(&self) -> String {

@@ -53,6 +53,11 @@ impl LatestSlot {
         self.slot().is_open = false;
     }
 
+    /// Is this the open stream?
+    pub(crate) fn is_open(&self) -> bool {
+        self.slot().is_open
+    }
+
     /// Offers an action, which replaces one that still waits. `None`: no stream is open. After a failure it is not taken.
     pub(crate) fn offer(&self, action: &FineTargets) -> Option<Result<Told, MoveError>> {
         let mut slot = self.slot();
@@ -89,6 +94,11 @@ impl LatestSlot {
         let mut slot = self.slot();
         slot.counts = counts;
         slot.failed = failed.or(slot.failed.take());
+    }
+
+    /// Takes the failure that the program was not told of yet.
+    pub(crate) fn take_failure(&self) -> Option<MoveError> {
+        self.slot().failed.take()
     }
 
     /// How the actions became points so far.

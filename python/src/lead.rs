@@ -27,6 +27,7 @@ impl PacedStream<'_> {
         if led.as_ref().is_err_and(ends_leading) {
             self.points.stop();
         }
+        self.note_failure(&led);
         self.slot.tell(self.points.counts(), led.err());
     }
 
@@ -54,6 +55,14 @@ impl PacedStream<'_> {
         Ok(())
     }
 
+    /// After a failure of the whole arm the next point is a first one. A stop and a first point that is far away are no failures of it.
+    pub(crate) fn note_failure<T>(&mut self, done: &Result<T, MoveError>) {
+        let is_of_arm = |failure: &MoveError| {
+            !matches!(failure, MoveError::Interrupted | MoveError::StartTooFar(_)) && ends_leading(failure)
+        };
+        self.has_failed |= done.as_ref().is_err_and(is_of_arm);
+    }
+
     /// After `Arm.stop` nothing is sent until the program was told.
     fn notice_stops(&mut self) -> Result<(), MoveError> {
         let stops = self.stops.load(Ordering::Relaxed);
@@ -67,7 +76,7 @@ impl PacedStream<'_> {
     }
 
     fn send_latest(&mut self, point: &FineTargets, inbox: &Inbox) -> Result<(), MoveError> {
-        self.notice_restores()?;
+        self.begin_again_if_lost()?;
         if std::mem::take(&mut self.is_held) {
             self.stream.begin_again()?;
             self.first = FirstPoints::default();

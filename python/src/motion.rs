@@ -1,7 +1,7 @@
 //! What the thread of the port does for one call of Python. Knows the library, not Python.
 
 use std::io;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use sevenbot::approach::ApproachRule;
 use sevenbot::cartesian::{Guard, PathBreach, StraightLine, StraightLineRequest, TipPose, Vector};
@@ -52,8 +52,7 @@ fn angles(arm: &mut Arm) -> Result<[f64; 7], Error> {
 /// Starts a move, as the command `pose` does.
 pub(crate) fn begin(arm: &mut Arm, targets: FineTargets, pace: Pace) -> Result<JointMove, MoveError> {
     arm.driven_joints()?;
-    pace.set(arm, &targets)?;
-    JointMove::begin_fine(arm, targets)
+    JointMove::begin_at_pace(arm, targets, pace)
 }
 
 /// Waits for a move. If the caller ends the wait, the arm holds.
@@ -137,14 +136,20 @@ fn speed_within(start: LineStart, tip: Vector, seconds: f64) -> Result<f64, Stra
 
 /// Waits on the clock of the arm's line.
 pub(crate) fn sleep(arm: &mut Arm, time: Duration, watch: &mut Watch<'_>) -> Result<(), MoveError> {
-    let end = arm.now() + time;
+    let slept = sleep_until(arm, arm.now() + time, watch);
+    if slept.is_err() {
+        arm.hold()?;
+    }
+    slept
+}
+
+fn sleep_until(arm: &mut Arm, end: Instant, watch: &mut Watch<'_>) -> Result<(), MoveError> {
     loop {
         let left = end.saturating_duration_since(arm.now());
         if left.is_zero() {
             return Ok(());
         }
         if !watch.goes_on() {
-            arm.hold()?;
             return Err(MoveError::Interrupted);
         }
         watch.pause(arm, left.min(SLEEP_PERIOD));
@@ -176,8 +181,7 @@ pub(crate) fn sample(
         if !watch.goes_on() {
             return Err(MoveError::Interrupted);
         }
-        let due = start + period.saturating_mul(number);
-        arm.sleep(due.saturating_duration_since(arm.now()));
+        sleep_until(arm, start + period.saturating_mul(number), watch)?;
         let angles = match row {
             Some(row) => arm.read_span(Span::of(&row))?.words(&row).map(|word| f64::from(word) / 100.0),
             None => arm.positions()?.map(|angle| f64::from(angle.degrees())),

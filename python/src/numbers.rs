@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyByteArray, PyBytes, PyDict, PyFrozenSet, PySet, PyString};
 
@@ -14,8 +15,11 @@ pub(crate) type Angles = (f64, f64, f64, f64, f64, f64, f64);
 const MOST_ROWS: usize = 10_000_000;
 
 /// The elements of a list, a tuple, an array or another ordered collection, at most one more than `most`. `None` for
-/// something else.
-pub(crate) fn elements<'py>(object: &Bound<'py, PyAny>, most: usize) -> Option<Vec<Bound<'py, PyAny>>> {
+/// something else. Fails with what the user's own iterator raises.
+pub(crate) fn elements<'py>(
+    object: &Bound<'py, PyAny>,
+    most: usize,
+) -> PyResult<Option<Vec<Bound<'py, PyAny>>>> {
     let is_text = object.is_instance_of::<PyString>()
         || object.is_instance_of::<PyBytes>()
         || object.is_instance_of::<PyByteArray>();
@@ -23,9 +27,13 @@ pub(crate) fn elements<'py>(object: &Bound<'py, PyAny>, most: usize) -> Option<V
         || object.is_instance_of::<PySet>()
         || object.is_instance_of::<PyFrozenSet>();
     if is_text || has_no_order {
-        return None;
+        return Ok(None);
     }
-    object.try_iter().ok()?.take(most.saturating_add(1)).collect::<PyResult<_>>().ok()
+    match object.try_iter() {
+        Ok(elements) => elements.take(most.saturating_add(1)).collect::<PyResult<_>>().map(Some),
+        Err(error) if error.is_instance_of::<PyTypeError>(object.py()) => Ok(None),
+        Err(error) => Err(error),
+    }
 }
 
 /// A number, also of numpy and of torch. Not a text.
@@ -58,7 +66,7 @@ impl<'py> FromPyObject<'_, 'py> for Values {
                 "a register takes a whole number, several a list of whole numbers",
             )
         };
-        match elements(&values, 256) {
+        match elements(&values, 256)? {
             Some(each) => each
                 .iter()
                 .map(|value| whole(value).ok_or_else(wrong))
@@ -82,7 +90,7 @@ impl<'py> FromPyObject<'_, 'py> for Numbers {
     type Error = PyErr;
 
     fn extract(numbers: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
-        let found = elements(&numbers, MOST_ROWS).and_then(|each| each.iter().map(real).collect());
+        let found = elements(&numbers, MOST_ROWS)?.and_then(|each| each.iter().map(real).collect());
         found
             .map(Self)
             .ok_or_else(|| InvalidType::raise(numbers.py(), "times are a list or an array of numbers"))
@@ -97,12 +105,13 @@ impl<'py> FromPyObject<'_, 'py> for Rows {
 
     fn extract(rows: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
         let wrong = || InvalidType::raise(rows.py(), "angles are rows of seven numbers");
-        let rows = elements(&rows, MOST_ROWS).ok_or_else(wrong)?;
+        let rows = elements(&rows, MOST_ROWS)?.ok_or_else(wrong)?;
         let row = |row: &Bound<'py, PyAny>| {
-            let numbers: Option<Vec<f64>> = elements(row, 7)?.iter().map(real).collect();
-            <[f64; 7]>::try_from(numbers?).ok()
+            let numbers: Option<Vec<f64>> =
+                elements(row, 7)?.and_then(|each| each.iter().map(real).collect());
+            numbers.and_then(|numbers| numbers.try_into().ok()).ok_or_else(wrong)
         };
-        rows.iter().map(|each| row(each).ok_or_else(wrong)).collect::<PyResult<_>>().map(Self)
+        rows.iter().map(row).collect::<PyResult<_>>().map(Self)
     }
 }
 

@@ -20,8 +20,19 @@ pub(crate) struct Observation {
     loads: [f64; 7],
     time: f64,
     age: f64,
-    monotonic: Instant,
+    monotonic: Monotonic,
 }
+
+/// An instant on the clock of `time.monotonic()`.
+#[derive(Clone, Copy)]
+enum Monotonic {
+    Instant(Instant),
+    /// Of a copy that `pickle` made: the seconds of the process that measured.
+    Seconds(f64),
+}
+
+/// The arguments of [`Observation::_of`]: positions, velocities, loads, time, age and `monotonic`.
+type Pickled = (Angles, Angles, Angles, f64, f64, f64);
 
 /// A cycle of the controller, in seconds.
 const CYCLE: f64 = 0.01;
@@ -44,7 +55,7 @@ impl Observation {
             loads: tenths(state.loads),
             time,
             age: CYCLE + waited,
-            monotonic: Instant::now(),
+            monotonic: Monotonic::Instant(Instant::now()),
         }
     }
 }
@@ -84,8 +95,32 @@ impl Observation {
     /// When the answer was here, on the clock of `time.monotonic()`.
     #[getter]
     fn monotonic(&self, py: Python<'_>) -> PyResult<f64> {
+        let instant = match self.monotonic {
+            Monotonic::Instant(instant) => instant,
+            Monotonic::Seconds(seconds) => return Ok(seconds),
+        };
         let now: f64 = py.import("time")?.call_method0("monotonic")?.extract()?;
-        Ok(now - self.monotonic.elapsed().as_secs_f64())
+        Ok(now - instant.elapsed().as_secs_f64())
+    }
+
+    /// From its numbers: what `pickle` calls.
+    #[staticmethod]
+    const fn _of(
+        positions: [f64; 7],
+        velocities: [f64; 7],
+        loads: [f64; 7],
+        time: f64,
+        age: f64,
+        monotonic: f64,
+    ) -> Self {
+        Self { positions, velocities, loads, time, age, monotonic: Monotonic::Seconds(monotonic) }
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Pickled)> {
+        let (positions, velocities, loads) =
+            (self.positions.into(), self.velocities.into(), self.loads.into());
+        let arguments = (positions, velocities, loads, self.time, self.age, self.monotonic(py)?);
+        Ok((py.get_type::<Self>().getattr("_of")?, arguments))
     }
 
     fn __repr__(&self) -> String {

@@ -72,10 +72,10 @@ impl Recording {
         let recording = Self::of_text(py, text)?;
         let Some(Numbers(arrivals)) = arrivals else { return Ok(recording) };
         if arrivals.len() != recording.__len__() {
-            return Err(InvalidValue::raise(
-                py,
-                "the recording and its times of arrival have different lengths",
-            ));
+            let (moments, arrivals) = (recording.__len__(), arrivals.len());
+            let text =
+                format!("{arrivals} times of arrival for {moments} moments: they need the same number");
+            return Err(InvalidValue::raise(py, &text));
         }
         Ok(recording.with_arrivals(arrivals))
     }
@@ -93,7 +93,11 @@ impl Recording {
         let (Numbers(times), Rows(angles)) = (times, angles);
         let vacuum = vacuum.map_or_else(|| Ok(vec![false; times.len()]), |vacuum| switches(py, vacuum))?;
         if times.len() != angles.len() || times.len() != vacuum.len() {
-            return Err(InvalidValue::raise(py, "times, angles and vacuum have different lengths"));
+            let (times, angles, vacuum) = (times.len(), angles.len(), vacuum.len());
+            let text = format!(
+                "times, angles and vacuum have the lengths {times}, {angles} and {vacuum}: use the same length"
+            );
+            return Err(InvalidValue::raise(py, &text));
         }
         let lines = times.iter().zip(&angles).zip(&vacuum).map(|((time, angles), vacuum)| {
             let angles = angles.map(|angle| format!(" {angle:.2}")).concat();
@@ -226,6 +230,6 @@ impl Recording {
 /// On or off, of numbers or truths.
 fn switches(py: Python<'_>, vacuum: &Bound<'_, PyAny>) -> PyResult<Vec<bool>> {
     let wrong = || InvalidType::raise(py, "vacuum is a list or an array of truths");
-    let each = elements(vacuum, usize::MAX).ok_or_else(wrong)?;
+    let each = elements(vacuum, usize::MAX)?.ok_or_else(wrong)?;
     each.iter().map(|one| one.is_truthy().map_err(|_| wrong())).collect()
 }

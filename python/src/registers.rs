@@ -174,7 +174,10 @@ impl Registers {
     /// What the register table says about a name: meaning, access, range and unit.
     fn describe(&self, py: Python<'_>, name: &str) -> PyResult<String> {
         raised(py, parse(name))?;
-        let row = row(name).ok_or_else(|| UnknownRegister::raise(py, name))?;
+        let row = row(name).ok_or_else(|| {
+            let text = format!("{name} is not in the register table: `list(arm.registers)` has the names");
+            UnknownRegister::raise(py, &text)
+        })?;
         let meaning = sevenbot::table::description(row);
         let range = range(row).map_or_else(String::new, |(low, high)| format!(", {low} to {high}"));
         Ok(format!("{}: {meaning} ({}{range}{})", name_of(row), access(row.access), unit(row)))

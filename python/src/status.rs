@@ -4,6 +4,7 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
+use sevenbot::health::JointHealth;
 use sevenbot::joints::JointSnapshot;
 use sevenbot::register_text::{faults, joints, motor_state_name, refusal_reason, servo_alarms};
 use sevenbot::{Arm, Error, Health, Joint, Snapshot, StatusBlock};
@@ -87,7 +88,9 @@ impl Status {
     /// The joints, joint 1 first.
     #[getter]
     fn joints(&self) -> Vec<JointStatus> {
-        self.health.joints.iter().map(|joint| JointStatus::of(*joint, self.health.is_driven())).collect()
+        let is_driven = self.health.is_driven();
+        let of = |joint: &JointHealth| JointStatus::of(*joint, is_driven, self.registers.clone());
+        self.health.joints.iter().map(of).collect()
     }
 
     /// The motor state: `"servo"`, `"damping protection"` or `"forceless"`.
@@ -229,7 +232,7 @@ impl Status {
 }
 
 impl Status {
-    fn numbers_of(&self, is_so: fn(&sevenbot::health::JointHealth) -> Option<bool>) -> Vec<u16> {
+    fn numbers_of(&self, is_so: fn(&JointHealth) -> Option<bool>) -> Vec<u16> {
         let joints = self.health.joints.iter().filter(|joint| is_so(joint) == Some(true));
         joints.map(|joint| u16::from(joint.joint.number())).collect()
     }

@@ -62,6 +62,11 @@ impl Stream {
         }
     }
 
+    /// Fails if this stream is not open, even if another stream of the arm is.
+    fn check_open(&self, py: Python<'_>) -> PyResult<()> {
+        if self.slot.is_open() { Ok(()) } else { Err(Closed::raise_no_stream(py)) }
+    }
+
     /// Warns once if the guard would not allow the points of the stream.
     fn warn_of_pose(&self, py: Python<'_>, [t1, t2, t3, t4, t5, ..]: [f64; 7]) -> PyResult<()> {
         let mut guard = lock(&self.guard);
@@ -73,25 +78,62 @@ impl Stream {
 }
 
 impl PacedStream<'_> {
-    /// Waits until the joints stand at their last points.
+    /// Waits until the joints stand at their last points. After a failure of the whole arm they will not get there: tells only a
+    /// program that does not know yet.
     fn arrive(&mut self, watch: &mut Watch<'_>) -> Result<(), MoveError> {
         self.finish_leading(watch)?;
+        if self.has_failed {
+            return self.slot.take_failure().map_or(Ok(()), Err);
+        }
         if self.pace.counts().points == 0 && self.points.counts().sent == 0 {
             return Ok(());
         }
         self.stream.wait_until_arrived(|stream, end| stream.wait_until(end, watch))
     }
 
-    /// After a restore the arm is elsewhere, and does not know of the stream.
-    pub(crate) fn notice_restores(&mut self) -> Result<(), StreamError> {
+    /// After a restore, and after a failure of the whole arm, the arm may be elsewhere, and may not know of the stream.
+    pub(crate) fn begin_again_if_lost(&mut self) -> Result<(), StreamError> {
         let restores = self.simulation.as_ref().map_or(0, SharedSimulation::restores);
-        if self.restores != restores {
+        if self.restores != restores || self.has_failed {
             self.stream.begin_again()?;
-            (self.restores, self.first) = (restores, FirstPoints::default());
+            (self.restores, self.has_failed, self.first) = (restores, false, FirstPoints::default());
             self.pose = self.stream.arm().standing()?.targets;
             self.pace.restart(self.stream.arm().elapsed());
         }
         Ok(())
+    }
+
+    /// Returns the number of the point, and the last points of all joints in degrees.
+    fn send_when_due(
+        &mut self,
+        point: &FineTargets,
+        watch: &mut Watch<'_>,
+    ) -> Result<(u32, [f64; 7]), MoveError> {
+        self.points.stop();
+        self.begin_again_if_lost()?;
+        if let Some(first) = { self.first }.take(point) {
+            self.approach(&first, watch)?;
+            self.first.take(point);
+        }
+        loop {
+            let left = self.pace.due().saturating_sub(self.elapsed());
+            if left.is_zero() {
+                break;
+            }
+            if !watch.goes_on() {
+                return Err(MoveError::Interrupted);
+            }
+            self.stream.arm().sleep(left.min(SLICE));
+            self.stream.keep_alive()?;
+        }
+        let now = self.elapsed();
+        let number = self.pace.take(now);
+        self.stream.send(point)?;
+        self.stream.check()?;
+        for (degrees, angle) in self.pose.iter_mut().zip(point) {
+            *degrees = angle.map_or(*degrees, FineAngle::degrees);
+        }
+        Ok((number, self.pose))
     }
 
     /// Goes to the first point of joints. The next point is due afterwards.
@@ -117,6 +159,7 @@ impl Stream {
 
     #[pyo3(signature = (*exception))]
     fn __exit__(&self, py: Python<'_>, exception: &Bound<'_, PyTuple>) -> PyResult<bool> {
+        self.check_open(py)?;
         let failed = exception.get_item(0).is_ok_and(|kind| !kind.is_none());
         let arrived = if failed {
             Ok(Ok(()))
@@ -135,35 +178,15 @@ impl Stream {
     ///
     /// The first point of a joint has to be within 5 degrees of where it stands, and is approached at up to 30 degrees per
     /// second; else `TooFar` is raised, unless the stream has an `approach`. Then the call takes that time. The first point below
-    /// the table or in the base gives a `GuardWarning`. After `Simulation.restore` the next point is a first one again.
+    /// the table or in the base gives a `GuardWarning`. After `Simulation.restore`, and after a failure of the whole arm, such as a
+    /// restart, the next point is a first one again.
     fn send(&self, py: Python<'_>, angles: Goals) -> PyResult<u32> {
         let point = angles.targets(py)?;
+        self.check_open(py)?;
         let sent = self.worker.stream_call(py, move |open, watch| {
-            open.points.stop();
-            open.notice_restores()?;
-            if let Some(first) = { open.first }.take(&point) {
-                open.approach(&first, watch)?;
-                open.first.take(&point);
-            }
-            loop {
-                let left = open.pace.due().saturating_sub(open.stream.arm().elapsed());
-                if left.is_zero() {
-                    break;
-                }
-                if !watch.goes_on() {
-                    return Err(MoveError::Interrupted);
-                }
-                open.stream.arm().sleep(left.min(SLICE));
-                open.stream.keep_alive()?;
-            }
-            let now = open.stream.arm().elapsed();
-            let number = open.pace.take(now);
-            open.stream.send(&point)?;
-            open.stream.check()?;
-            for (degrees, angle) in open.pose.iter_mut().zip(point) {
-                *degrees = angle.map_or(*degrees, FineAngle::degrees);
-            }
-            Ok((number, open.pose))
+            let sent = open.send_when_due(&point, watch);
+            open.note_failure(&sent);
+            sent
         })?;
         let (number, pose) = raised(py, sent)?;
         self.warn_of_pose(py, pose)?;
@@ -182,7 +205,7 @@ impl Stream {
     /// `Arm.sleep`, or when the arm is asked. `record`, `sample` and moves hold the sender up.
     fn latest(&self, py: Python<'_>, angles: Goals) -> PyResult<StreamCounts> {
         let action = angles.targets(py)?;
-        let told = self.slot.offer(&action).ok_or_else(|| Closed::raise_closed(py))?;
+        let told = self.slot.offer(&action).ok_or_else(|| Closed::raise_no_stream(py))?;
         let told = raised(py, told)?;
         self.worker.wake(py)?;
         self.warn_of_pose(py, told.pose)?;

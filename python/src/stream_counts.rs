@@ -26,8 +26,22 @@ impl From<LatestCounts> for StreamCounts {
     }
 }
 
+/// The arguments of [`StreamCounts::_of`].
+type Pickled = (u32, u32, u32, u32, u32);
+
 #[pymethods]
 impl StreamCounts {
+    /// From its numbers: what `pickle` calls.
+    #[staticmethod]
+    const fn _of(sent: u32, skipped: u32, repeated: u32, missed: u32, watchdog: u32) -> Self {
+        Self { sent, skipped, repeated, missed, watchdog }
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Pickled)> {
+        let arguments = (self.sent, self.skipped, self.repeated, self.missed, self.watchdog);
+        Ok((py.get_type::<Self>().getattr("_of")?, arguments))
+    }
+
     fn __repr__(&self) -> String {
         let Self { sent, skipped, repeated, missed, watchdog } = self;
         format!(

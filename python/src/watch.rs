@@ -40,6 +40,8 @@ pub(crate) struct PacedStream<'a> {
     pub(crate) slot: Arc<LatestSlot>,
     /// The watchdog of the arm has acted since the last point.
     pub(crate) is_held: bool,
+    /// The whole arm has failed since the last point: the next one is a first one.
+    pub(crate) has_failed: bool,
     /// How often the arm was stopped by now, and at the last look.
     pub(crate) stops: Arc<AtomicU64>,
     pub(crate) stops_before: u64,
@@ -67,6 +69,7 @@ impl<'a> PacedStream<'a> {
             points: LatestPoints::new(options),
             slot,
             is_held: false,
+            has_failed: false,
             stops: Arc::clone(stops),
             stops_before: stops.load(Ordering::Relaxed),
             restores: simulation.as_ref().map_or(0, SharedSimulation::restores),
@@ -98,9 +101,10 @@ pub(crate) enum Message {
     Read(ArmCall),
     /// Wait this long, in the time of the arm's line.
     Sleep(Duration, Arc<CallState>, SyncSender<Result<(), MoveError>>),
-    OpenStream(StreamOrder, StreamResult),
+    OpenStream(StreamOrder, Arc<CallState>, StreamResult),
     StreamCall(StreamCall),
-    CloseStream(StreamResult),
+    /// Runs also if its caller has left.
+    CloseStream(Arc<CallState>, StreamResult),
     /// Look what is due. An arm in virtual time looks while its time passes.
     Wake,
 }
@@ -108,6 +112,8 @@ pub(crate) enum Message {
 /// What the two threads of a call share.
 #[derive(Debug, Default)]
 pub(crate) struct CallState {
+    /// Has the thread of the port begun the call, or has its caller left before?
+    is_claimed: AtomicBool,
     is_interrupted: AtomicBool,
     /// The number of stops so far, and that at the start of the call.
     stops: Arc<AtomicU64>,
@@ -121,6 +127,12 @@ impl CallState {
     pub(crate) fn new(stops: &Arc<AtomicU64>) -> Self {
         let stops_before = stops.load(Ordering::Relaxed);
         Self { stops: Arc::clone(stops), stops_before, ..Self::default() }
+    }
+
+    /// Claims the call, for the thread of the port to run it, or for the caller to leave before it runs. The first of them gets
+    /// `true`.
+    pub(crate) fn claim(&self) -> bool {
+        !self.is_claimed.swap(true, Ordering::Relaxed)
     }
 
     /// A signal of Python ends the call.

@@ -102,9 +102,15 @@ impl Worker {
         work: impl FnOnce(&mut Arm) -> T + Send + 'static,
     ) -> PyResult<T> {
         let (reply, answer) = sync_channel(1);
-        let call = move |arm: &mut Arm, _: &Inbox| drop(reply.send(work(arm)));
+        let state = Arc::<CallState>::default();
+        let shared = Arc::clone(&state);
+        let call = move |arm: &mut Arm, _: &Inbox| {
+            if shared.claim() {
+                drop(reply.send(work(arm)));
+            }
+        };
         self.send(py, Message::Read(Box::new(call)))?;
-        let (result, signal) = self.wait(py, answer, &CallState::default())?;
+        let (result, signal) = self.wait(py, answer, &state)?;
         signal.map_or(Ok(result), Err)
     }
 
@@ -125,9 +131,11 @@ impl Worker {
         let (reply, answer) = sync_channel(1);
         let state = Arc::new(CallState::new(&self.stops));
         let shared = Arc::clone(&state);
-        // The caller has gone only if the interpreter ends.
         let call = move |arm: &mut Arm, inbox: &Inbox| {
-            drop(reply.send(work(arm, &mut Watch { state: shared, inbox })));
+            if shared.claim() {
+                // The caller has gone only if the interpreter ends.
+                drop(reply.send(work(arm, &mut Watch { state: shared, inbox })));
+            }
         };
         self.send(py, Message::Call(Box::new(call)))?;
         self.wait(py, answer, &state)
@@ -154,8 +162,14 @@ impl Worker {
 
     pub(crate) fn open_stream(&self, py: Python<'_>, order: StreamOrder) -> PyResult<()> {
         let (reply, answer) = sync_channel(1);
-        self.send(py, Message::OpenStream(order, reply))?;
-        finish(py, self.wait(py, answer, &CallState::default())?)
+        let state = Arc::<CallState>::default();
+        self.send(py, Message::OpenStream(order, Arc::clone(&state), reply))?;
+        let opened = self.wait(py, answer, &state).map_err(|error| {
+            // The thread does not answer while another stream is open.
+            let is_other_open = self.is_open() && error.is_instance_of::<Closed>(py);
+            if is_other_open { Closed::raise_other_stream(py) } else { error }
+        })?;
+        finish(py, opened)
     }
 
     /// As [`Self::call`], for the open stream.
@@ -168,7 +182,9 @@ impl Worker {
         let state = Arc::new(CallState::new(&self.stops));
         let shared = Arc::clone(&state);
         let call = move |stream: &mut PacedStream<'_>, inbox: &Inbox| {
-            drop(reply.send(work(stream, &mut Watch { state: shared, inbox })));
+            if shared.claim() {
+                drop(reply.send(work(stream, &mut Watch { state: shared, inbox })));
+            }
         };
         self.send(py, Message::StreamCall(Box::new(call)))?;
         let (result, signal) = self.wait(py, answer, &state)?;
@@ -177,15 +193,17 @@ impl Worker {
 
     pub(crate) fn close_stream(&self, py: Python<'_>) -> PyResult<()> {
         let (reply, answer) = sync_channel(1);
-        self.send(py, Message::CloseStream(reply))?;
-        finish(py, self.wait(py, answer, &CallState::default())?)
+        let state = Arc::<CallState>::default();
+        self.send(py, Message::CloseStream(Arc::clone(&state), reply))?;
+        finish(py, self.wait(py, answer, &state)?)
     }
 
-    /// Ends the thread, and waits until the port is closed. A forked process has nothing to close.
+    /// Ends all calls so far and the thread, and waits until the port is closed. A forked process has nothing to close.
     pub(crate) fn close(&self, py: Python<'_>) {
         if self.is_forked() {
             return;
         }
+        self.interrupt();
         let open = lock(&self.open).take();
         if let Some(Port { messages, thread }) = open {
             drop(messages);
@@ -248,7 +266,7 @@ fn finish(py: Python<'_>, (result, signal): (Result<(), StreamError>, Option<PyE
 
 /// What a signal of Python does to a wait.
 enum Wait<'a> {
-    /// It interrupts the call, whose result follows at once.
+    /// It interrupts the call, whose result follows at once. From a call that waits for another one, the caller leaves.
     ToTheEnd { shows_progress: bool },
     /// The caller leaves, and sets this.
     AtMostUntilSignal(&'a AtomicBool),
@@ -271,7 +289,7 @@ fn wait<T: Send>(
         answer = receiver;
         match received {
             Ok(result) => return Ok((result, signal)),
-            Err(RecvTimeoutError::Disconnected) => return Err(Closed::raise_closed(py)),
+            Err(RecvTimeoutError::Disconnected) => return Err(Closed::raise_no_stream(py)),
             Err(RecvTimeoutError::Timeout) => {}
         }
         if matches!(how, Wait::ToTheEnd { shows_progress: true }) {
@@ -284,6 +302,9 @@ fn wait<T: Send>(
             is_left.store(true, Ordering::Relaxed);
             return Err(raised);
         }
+        if state.claim() {
+            return Err(raised);
+        }
         signal = Some(raised);
     }
 }
@@ -292,10 +313,11 @@ fn serve(mut arm: Arm, inbox: &Inbox, stops: &Arc<AtomicU64>) {
     while let Some(message) = inbox.next() {
         match message {
             Message::Call(call) | Message::Read(call) => call(&mut arm, inbox),
+            Message::Sleep(_, state, _) | Message::OpenStream(_, state, _) if !state.claim() => {}
             Message::Sleep(time, state, slept) => {
                 let _ = slept.send(motion::sleep(&mut arm, time, &mut Watch { state, inbox }));
             }
-            Message::OpenStream(order, opened) => match PacedStream::open(&mut arm, order, stops) {
+            Message::OpenStream(order, _, opened) => match PacedStream::open(&mut arm, order, stops) {
                 Ok(stream) => {
                     let _ = opened.send(Ok(()));
                     serve_stream(stream, inbox);
@@ -303,7 +325,7 @@ fn serve(mut arm: Arm, inbox: &Inbox, stops: &Arc<AtomicU64>) {
                 Err(error) => drop(opened.send(Err(error))),
             },
             // No stream is open. The caller sees the end of the channel.
-            Message::StreamCall(_) | Message::CloseStream(_) | Message::Wake => {}
+            Message::StreamCall(_) | Message::CloseStream(..) | Message::Wake => {}
         }
     }
 }
@@ -317,12 +339,14 @@ fn serve_stream(mut stream: PacedStream<'_>, inbox: &Inbox) {
         }
         match message {
             Message::Call(call) | Message::Read(call) => call(stream.stream.arm(), inbox),
+            Message::Sleep(_, state, _) if !state.claim() => {}
             Message::Sleep(time, state, slept) => {
                 let _ = slept.send(stream.sleep(time, &mut Watch { state, inbox }));
             }
             Message::StreamCall(call) => call(&mut stream, inbox),
             Message::OpenStream(..) | Message::Wake => {}
-            Message::CloseStream(closed) => {
+            Message::CloseStream(state, closed) => {
+                state.claim();
                 let _ = closed.send(stream.close());
                 return;
             }

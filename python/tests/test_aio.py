@@ -108,3 +108,29 @@ def test_a_cancelled_stream_holds_and_ends() -> None:
             assert await arm.get("set-point-period") == 0
 
     asyncio.run(run())
+
+
+def test_an_arm_is_asked_and_its_motors_are_switched() -> None:
+    async def run() -> None:
+        async with aio.Arm.simulated() as arm:
+            await arm.sleep(1)
+            assert await arm.is_connected()
+            await arm.torque_off()
+            assert await arm.get("motor-state") == 2
+            await arm.torque_on()
+            registers = await arm.registers()
+            assert registers["motor-state"] == 1 and registers.keys() == set(arm.sync.registers.keys())
+        assert not await arm.is_connected()
+
+    asyncio.run(run())
+
+
+def test_a_closed_arm_can_be_closed_again() -> None:
+    async def run() -> None:
+        async with aio.Arm.simulated() as arm:
+            await arm.close()
+        async with arm:
+            pass
+        await arm.close()
+
+    asyncio.run(run())

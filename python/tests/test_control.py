@@ -67,7 +67,7 @@ def test_kinematics_need_no_arm(simulated_arm: sevenbot.SimulatedArm) -> None:
         sevenbot.inverse(0, 900, 0)
     low, high = sevenbot.limits()
     assert list(low) == [0] * 7 and list(high) == [180] * 6 + [84]
-    with pytest.raises(TypeError, match="each joint"):
+    with pytest.raises(TypeError, match="None is not allowed"):
         sevenbot.forward([None, *REST[1:]])  # type: ignore[list-item]
 
 

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import _thread
+import copy
+import multiprocessing
 import os
 import pickle
 import pty
 import subprocess
 import sys
 import threading
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy
@@ -223,6 +226,29 @@ def test_arrays_lists_and_paths_are_taken(simulated_arm: sevenbot.Arm, tmp_path:
         sevenbot.Arm(tmp_path / "no-port")
 
 
+@pytest.mark.parametrize("failure", [KeyboardInterrupt, RuntimeError, TypeError])
+def test_an_exception_of_a_generator_is_not_replaced(
+    simulated_arm: sevenbot.Arm, failure: type[BaseException]
+) -> None:
+    def numbers() -> Iterator[int]:
+        yield 90
+        raise failure("mine")
+
+    calls: list[Callable[[], object]] = [
+        lambda: simulated_arm.pose(numbers()),
+        lambda: simulated_arm.set("speed", numbers()),
+        lambda: simulated_arm.move_to(0, 185, 60, tool=numbers()),
+        lambda: sevenbot.Recording.from_points(numbers(), [REST]),
+        lambda: sevenbot.Recording.from_points([0], [numbers()]),
+        lambda: sevenbot.Recording.from_points([0], [REST], map(bool, numbers())),
+        lambda: sevenbot.SimulatedArms(2, seeds=numbers()),
+    ]
+    for call in calls:
+        with pytest.raises(failure, match="mine") as raised:
+            call()
+        assert not isinstance(raised.value, sevenbot.Error)
+
+
 Wrong = Callable[[sevenbot.SimulatedArm], object]
 WRONG: dict[str, tuple[type[Exception], Wrong]] = {
     "six angles": (TypeError, lambda arm: arm.pose([1, 2, 3, 4, 5, 6])),
@@ -356,13 +382,82 @@ def test_a_write_waits_for_the_call_before(simulated_arm: sevenbot.SimulatedArm)
 def test_values_are_equal_and_can_be_pickled(simulated_arm: sevenbot.Arm) -> None:
     status, tip, recording = simulated_arm.status(), simulated_arm.where(), simulated_arm.record(0.5)
     for value in [status, tip, recording]:
-        copy = pickle.loads(pickle.dumps(value))
-        assert copy == value and copy is not value and hash(copy) == hash(value)
+        other = pickle.loads(pickle.dumps(value))
+        assert other == value and other is not value and hash(other) == hash(value)
         assert value != 5 and not value == "x"
-        assert str(copy) == str(value) and repr(copy) == repr(value)
+        assert str(other) == str(value) and repr(other) == repr(value)
     simulated_arm.pose([120, *REST[1:]])
     assert simulated_arm.where() != tip and simulated_arm.status() != status
     assert simulated_arm.record(0.5) != recording
+
+
+def test_what_an_arm_tells_can_be_pickled(simulated_arm: sevenbot.SimulatedArm) -> None:
+    simulated_arm.simulation.fault("3=missing")
+    simulated_arm.sleep(1)
+    status, seen = simulated_arm.status(), simulated_arm.observe()
+    assert status is not None and status.problems
+    for value in [*status.problems, *status.joints]:
+        other = pickle.loads(pickle.dumps(value))
+        names = [name for name in dir(value) if not name.startswith("_")]
+        assert [getattr(other, name) for name in names] == [getattr(value, name) for name in names]
+        assert repr(other) == repr(value) and str(other) == str(value)
+    other = pickle.loads(pickle.dumps(seen))
+    assert (other.time, other.age) == (seen.time, seen.age) and repr(other) == repr(seen)
+    for name in ["positions", "velocities", "loads"]:
+        assert getattr(other, name).tolist() == getattr(seen, name).tolist()
+    assert other.monotonic == pytest.approx(seen.monotonic, abs=1e-3)
+    assert pickle.loads(pickle.dumps(other)).monotonic == other.monotonic
+    simulated_arm.simulation.clear()
+    simulated_arm.sleep(1)
+    with simulated_arm.stream(guard=False) as stream:
+        stream.latest(simulated_arm.angles)
+        simulated_arm.sleep(0.2)
+        counts = stream.counts
+    assert counts.sent > 1 and pickle.loads(pickle.dumps(counts)) == counts
+
+
+def raise_of_file(path: str) -> None:
+    sevenbot.Recording.load(path)
+
+
+def raise_of_arm(fault: str) -> None:
+    with sevenbot.Arm.simulated() as arm:
+        arm.sleep(1)
+        arm.simulation.fault(fault)
+        arm.sleep(1)
+        arm.angles
+
+
+def raise_of_closed(what: str) -> None:
+    arm = sevenbot.Arm.simulated()
+    arm.close()
+    getattr(arm, what)
+
+
+@pytest.mark.parametrize(
+    ("call", "argument", "kinds"),
+    [
+        (raise_of_file, "/no/such/file", [sevenbot.FileError, FileNotFoundError]),
+        (raise_of_file, "/", [sevenbot.FileError, IsADirectoryError]),
+        (raise_of_arm, "3=missing", [sevenbot.ArmProblem]),
+        (raise_of_arm, "no fault", [sevenbot.InvalidValue]),
+        (raise_of_closed, "angles", [sevenbot.Closed, AttributeError]),
+    ],
+)
+def test_an_exception_goes_through_a_process(
+    call: Callable[[str], None], argument: str, kinds: list[type[Exception]]
+) -> None:
+    with pytest.raises(sevenbot.Error) as here:
+        call(argument)
+    with multiprocessing.get_context("spawn").Pool(1) as pool, pytest.raises(sevenbot.Error) as there:
+        pool.apply(call, (argument,))
+    for error in [there.value, pickle.loads(pickle.dumps(there.value)), copy.copy(here.value)]:
+        assert all(isinstance(error, kind) for kind in kinds)
+        assert type(error).__name__ == type(here.value).__name__ and str(error) == str(here.value)
+        assert error.args == here.value.args and error.hints == here.value.hints
+        assert getattr(error, "filename", None) == getattr(here.value, "filename", None)
+        if isinstance(error, sevenbot.ArmProblem):
+            assert error.joints == (3,) and error.problems[0].kind == "no answer"
 
 
 def test_a_recording_can_be_indexed(simulated_arm: sevenbot.Arm) -> None:
@@ -398,3 +493,73 @@ def test_the_progress_bar_can_be_switched_off(simulated_arm: sevenbot.Arm) -> No
     assert simulated_arm.progress
     simulated_arm.progress = False
     assert not simulated_arm.progress
+
+
+@pytest.fixture
+def recording_arm(simulated_arm: sevenbot.SimulatedArm) -> Iterator[sevenbot.SimulatedArm]:
+    """An arm that another thread records without end."""
+
+    def record() -> None:
+        with pytest.raises(sevenbot.Interrupted):
+            simulated_arm.record()
+
+    start = simulated_arm.simulation.now
+    thread = threading.Thread(target=record, daemon=True)
+    thread.start()
+    while simulated_arm.simulation.now == start:
+        time.sleep(0.001)
+    yield simulated_arm
+    thread.join(ENOUGH)
+    assert not thread.is_alive()
+
+
+@pytest.mark.usefixtures("ctrl_c")
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda arm: arm.angles,
+        lambda arm: arm.set("speed.1", 10),
+        lambda arm: arm.sleep(1),
+        lambda arm: arm.stream().__enter__(),
+    ],
+)
+def test_ctrl_c_ends_a_call_that_waits_for_another_thread(
+    recording_arm: sevenbot.SimulatedArm, call: Callable[[sevenbot.Arm], object]
+) -> None:
+    timer = threading.Timer(0.2, _thread.interrupt_main)
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        call(recording_arm)
+    timer.join()
+    recording_arm.stop()
+    assert recording_arm.get("speed.1") != 10 and recording_arm.get("set-point-period") == 0, "it does not run later"
+
+
+@pytest.mark.parametrize("close", [sevenbot.Arm.close, sevenbot.Arm.__exit__])
+def test_close_ends_the_call_of_another_thread(
+    recording_arm: sevenbot.SimulatedArm, close: Callable[[sevenbot.Arm], object]
+) -> None:
+    close(recording_arm)
+    assert not recording_arm.is_connected
+
+
+@pytest.mark.usefixtures("ctrl_c")
+def test_ctrl_c_and_stop_end_a_sample_between_its_reads() -> None:
+    with sevenbot.Arm("sim") as arm:
+        timer = threading.Timer(0.2, _thread.interrupt_main)
+        timer.start()
+        with pytest.raises(KeyboardInterrupt):
+            arm.sample(2, period=86_400)
+        timer.join()
+        done = threading.Event()
+
+        def stop() -> None:
+            while not done.is_set():
+                arm.stop()
+
+        thread = threading.Thread(target=stop)
+        thread.start()
+        with pytest.raises(sevenbot.Interrupted):
+            arm.sample(2, period=86_400)
+        done.set()
+        thread.join()

@@ -80,3 +80,40 @@ def test_each_arm_has_its_own_disturbances() -> None:
 def test_a_wrong_number_of_actions_is_said() -> None:
     with pytest.raises(ValueError, match="shape"):
         sevenbot.gym.ReachVectorEnv(3).step(numpy.zeros((2, 5), dtype=numpy.float32))
+
+
+def test_a_wrong_action_changes_nothing() -> None:
+    env, other = sevenbot.gym.ReachEnv(), sevenbot.gym.ReachEnv()
+    for each in (env, other):
+        each.reset(seed=1)
+    action = numpy.full(5, 0.5, dtype=numpy.float32)
+    for wrong in ([0, 0, float("nan"), 0, 0], [float("inf")] * 5, [0, 0, 0]):
+        with pytest.raises(ValueError, match="finite|shape"):
+            env.step(numpy.array(wrong, dtype=numpy.float32))
+        assert env.step(action)[0].tolist() == other.step(action)[0].tolist()
+
+
+@pytest.mark.parametrize("disturbed", [False, True])
+def test_each_of_several_seeds_counts(disturbed: bool) -> None:
+    seeds: list[int | None] = [5, 1, 5]
+    envs = sevenbot.gym.ReachVectorEnv(3, disturbed=disturbed, max_episode_steps=20)
+    alone = [sevenbot.gym.ReachEnv(disturbed=disturbed) for _ in seeds]
+    action = numpy.full((3, 5), 0.5, dtype=numpy.float32)
+    seen = envs.reset(seed=seeds)[0]
+    assert seen.tolist() == [env.reset(seed=seed)[0].tolist() for env, seed in zip(alone, seeds)]
+    for step in range(45):
+        # An episode has 20 steps, and the reset after it takes the place of a step.
+        over = step in (20, 41)
+        seen = envs.step(action)[0]
+        wanted = [env.reset()[0] if over else env.step(row)[0] for env, row in zip(alone, action)]
+        assert seen.tolist() == numpy.array(wanted).tolist()
+
+
+def test_seeds_are_checked_and_may_be_of_numpy() -> None:
+    envs = sevenbot.gym.ReachVectorEnv(2)
+    of_numpy: Any = numpy.int64(3)
+    assert envs.reset(seed=of_numpy)[0].tolist() == envs.reset(seed=3)[0].tolist()
+    assert envs.reset(seed=[None, 3])[0][1].tolist() == sevenbot.gym.ReachEnv().reset(seed=3)[0].tolist()
+    for count in (0, 3):
+        with pytest.raises(ValueError, match="one for each of 2 arms"):
+            envs.reset(seed=[1] * count)

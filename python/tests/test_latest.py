@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import time
+from collections.abc import Callable
 
 import pytest
 
@@ -269,3 +270,53 @@ def test_latest_does_not_wait_for_the_way_to_the_first_action() -> None:
         with arm.stream(PERIOD, approach=3) as stream:
             for _ in range(50):
                 assert stream.latest(turned(100)).sent <= 1
+
+
+def let_go(arm: sevenbot.SimulatedArm) -> None:
+    arm.set("motor-state", 2)
+
+
+def restart(arm: sevenbot.SimulatedArm) -> None:
+    arm.simulation.power_cycle()
+
+
+@pytest.mark.parametrize("method", ["latest", "send"])
+@pytest.mark.parametrize("fail, failure", [(let_go, sevenbot.NotDriven), (restart, sevenbot.ArmProblem)])
+def test_after_a_failure_of_the_whole_arm_the_next_point_is_a_first_one(
+    simulated_arm: sevenbot.SimulatedArm,
+    method: str,
+    fail: Callable[[sevenbot.SimulatedArm], None],
+    failure: type[sevenbot.Error],
+) -> None:
+    with simulated_arm.stream(PERIOD, guard=False) as stream:
+
+        def send(angles: list[float]) -> None:
+            for _ in range(20):
+                getattr(stream, method)(angles)
+                simulated_arm.sleep(PERIOD)
+
+        send(REST)
+        fail(simulated_arm)
+        with pytest.raises(failure):
+            send(REST)
+        simulated_arm.sleep(1)
+        simulated_arm.torque_on()
+        here = list(simulated_arm.angles)
+        with pytest.raises(sevenbot.TooFar, match="joint 1"):
+            send([here[0] + 50, *here[1:]])
+        send(here)
+        assert simulated_arm.get("set-point-period") == 20 and simulated_arm.get("host-watchdog") == 30
+        # The program knows of it, so the end of the stream does not tell it again.
+        fail(simulated_arm)
+        with pytest.raises(failure):
+            send(here)
+    assert simulated_arm.get("set-point-period") == 0
+
+
+def test_a_failure_that_the_program_does_not_know_is_told_at_the_end(simulated_arm: sevenbot.SimulatedArm) -> None:
+    with pytest.raises(sevenbot.NotDriven):
+        with simulated_arm.stream(PERIOD) as stream:
+            stream.latest(REST)
+            simulated_arm.sleep(0.1)
+            simulated_arm.set("motor-state", 2)
+            simulated_arm.sleep(0.15)

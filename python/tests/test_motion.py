@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -61,6 +62,25 @@ def test_a_silent_stream_holds_and_a_slow_one_does_not(simulated_arm: sevenbot.A
         simulated_arm.simulation.advance(1)
         status = simulated_arm.status()
         assert status is not None and "silent" in status.faults
+
+
+def test_an_arm_has_one_stream_at_a_time(simulated_arm: sevenbot.Arm) -> None:
+    one, two = simulated_arm.stream(0.02), simulated_arm.stream(0.05)
+    with one:
+        one.send(REST)
+        for stream in (one, two):
+            with pytest.raises(sevenbot.Closed, match="has an open stream already"):
+                stream.__enter__()
+        with pytest.raises(sevenbot.Closed, match="stream is not open"):
+            two.send(REST)
+        with pytest.raises(sevenbot.Closed, match="stream is not open"):
+            two.__exit__()
+        assert one.send(REST) == 1 and simulated_arm.get("set-point-period") == 20
+    with two:
+        assert two.send(REST) == 0
+    simulated_arm.close()
+    with pytest.raises(sevenbot.Closed, match="arm is closed"):
+        two.__enter__()
 
 
 def test_a_stream_ends_after_an_exception_and_refuses_wrong_values(simulated_arm: sevenbot.Arm) -> None:
@@ -136,3 +156,35 @@ def test_without_numpy_there_are_tuples(tmp_path: Path) -> None:
         "assert isinstance(times, tuple) and isinstance(angles, tuple) and len(angles[0]) == 7\n"
     )
     subprocess.run([sys.executable, "-c", script], check=True, cwd=tmp_path)
+
+
+def test_a_recording_has_no_moments_of_the_move_before(simulated_arm: sevenbot.Arm) -> None:
+    points = [REST, [100, *REST[1:]]]
+    simulated_arm.play(sevenbot.Recording.from_points([0, 2], points))
+    simulated_arm.pose([30, *REST[1:]])
+    recorded = simulated_arm.record(2, hz=50)
+    assert len(recorded) == 101
+    assert set(recorded.angles[:, 0]) == {simulated_arm.angles[0]}
+
+
+def test_many_frames_are_no_restart_and_a_restart_after_them_is_told(simulated_arm: sevenbot.SimulatedArm) -> None:
+    points = [REST, [92, *REST[1:]]]
+    # The arm accepts 50 points a second, and its counter of frames has 16 bits.
+    simulated_arm.play(sevenbot.Recording.from_points([0, 700], points), approach=1)
+    simulated_arm.simulation.later(0.2, "restart")
+    with pytest.raises(sevenbot.ArmProblem, match="restarted"):
+        simulated_arm.torque_on()
+    simulated_arm.sample(40_000)
+    simulated_arm.simulation.later(0.5, "restart")
+    with pytest.raises(sevenbot.ArmProblem, match="restarted"):
+        simulated_arm.sample(2_000)
+
+
+@pytest.mark.parametrize("hold", [sevenbot.Arm.stop, sevenbot.Arm.torque_on])
+def test_a_joint_that_is_dragged_away_does_not_hold(
+    simulated_arm: sevenbot.SimulatedArm, hold: Callable[[sevenbot.Arm], object]
+) -> None:
+    simulated_arm.simulation.fault("2=push=-3000")
+    simulated_arm.sleep(0.2)
+    with pytest.raises(sevenbot.MayMove, match="joint 2 is at 0"):
+        hold(simulated_arm)

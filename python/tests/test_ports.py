@@ -50,7 +50,7 @@ def server(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Server]:
     """A simulated arm with the number 42, behind a server that wants a token over TCP."""
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     link = tmp_path / "arm"
-    simulator = start("host-sim", "--quiet", "--control", "none", "--link", str(link))
+    simulator = start("host-sim", "--quiet", "--control", "none", "--eeprom", "none", "--link", str(link))
     ready(simulator, "/")
     with sevenbot.Arm(link) as arm:
         arm.set("device-id", 42, unlock=True)

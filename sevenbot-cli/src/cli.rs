@@ -1,8 +1,12 @@
 //! The command line: global options, commands and help. The arguments of a command are in the command's own file.
 
+use std::error::Error;
+use std::ffi::OsString;
+use std::num::{IntErrorKind, ParseIntError};
 use std::path::PathBuf;
 
-use clap::{Args, CommandFactory, Parser, Subcommand, value_parser};
+use clap::error::ContextKind;
+use clap::{Arg, Args, CommandFactory, FromArgMatches, Parser, Subcommand, value_parser};
 use sevenbot::Map;
 
 use crate::command_error::CommandError;
@@ -57,6 +61,36 @@ pub(crate) struct Cli {
     pub(crate) global: Global,
     #[command(subcommand)]
     pub(crate) command: Command,
+}
+
+impl Cli {
+    /// Parses these arguments, the program first. Says what is wrong in words of the command line.
+    pub(crate) fn from_arguments(arguments: impl Iterator<Item = OsString>) -> Result<Self, clap::Error> {
+        let matches = with_negative_numbers(Self::command()).try_get_matches_from(arguments);
+        matches.and_then(|matches| Self::from_arg_matches(&matches)).map_err(in_plain_words)
+    }
+}
+
+/// Each value may be a negative number. So the message tells the range, and not that `-3` is no option.
+fn with_negative_numbers(command: clap::Command) -> clap::Command {
+    let allow =
+        |arg: Arg| if arg.get_action().takes_values() { arg.allow_negative_numbers(true) } else { arg };
+    command.mut_args(allow).mut_subcommands(with_negative_numbers)
+}
+
+/// The error with a message of its own if a value is not a whole number.
+fn in_plain_words(error: clap::Error) -> clap::Error {
+    let reason = error.source().and_then(|source| source.downcast_ref::<ParseIntError>());
+    let what = match reason.map(ParseIntError::kind) {
+        None => return error,
+        Some(IntErrorKind::PosOverflow | IntErrorKind::NegOverflow) => "it is out of range",
+        Some(_) => "use a whole number",
+    };
+    let part = |kind| error.get(kind).map(ToString::to_string).unwrap_or_default();
+    let (argument, value) = (part(ContextKind::InvalidArg), part(ContextKind::InvalidValue));
+    let help = "For more information, try '--help'.";
+    let message = format!("invalid value '{value}' for '{argument}': {what}\n\n{help}\n");
+    clap::Error::raw(error.kind(), message).with_cmd(&Cli::command())
 }
 
 /// Options of every command.
@@ -218,9 +252,43 @@ mod tests {
         check(&Cli::command());
     }
 
+    fn parsed(arguments: &str) -> Result<Cli, String> {
+        let arguments = ["sevenbot"].into_iter().chain(arguments.split(' ')).map(OsString::from);
+        Cli::from_arguments(arguments).map_err(|error| error.to_string())
+    }
+
     #[test]
     fn negative_values_are_no_options() {
-        let cli = Cli::try_parse_from(["sevenbot", "set", "offset.2", "-5"]).expect("a value");
+        let cli = parsed("set offset.2 -5").expect("a value");
         assert!(matches!(cli.command, Command::Set(set::SetArgs { values, .. }) if values == [-5]));
+        for (arguments, says) in [
+            ("home --speed -3deg/s", "a speed from 0 to 100 steps"),
+            ("home --time -1s --wait", "for '--time <STEPS|S>'"),
+            ("play a.txt --speed -1x", "a factor from 0.1 to 10"),
+            ("play a.txt --approach -1", "a number from 0.1 to 60"),
+            ("monitor --hz -3", "-3 is not in 1..=50"),
+            ("--timeout -1 info", "-1 is not in 1..=65535"),
+            ("info --baud -9600", "-9600 is not in 1..=4294967295"),
+        ] {
+            let message = parsed(arguments).expect_err(arguments);
+            assert!(message.contains(says), "{arguments}: {message}");
+        }
+    }
+
+    #[test]
+    fn the_standard_park_pose_is_not_kept() {
+        let message = parsed("park --standard --keep").expect_err("nothing to keep");
+        assert!(message.contains("'--standard' cannot be used with '--keep'"), "{message}");
+    }
+
+    #[test]
+    fn what_is_no_whole_number_is_told_in_words() {
+        for arguments in ["monitor --hz NaN", "servo set 3 max-torque 1.5", "log --seconds ten"] {
+            let message = parsed(arguments).expect_err(arguments);
+            assert!(message.contains(": use a whole number\n"), "{arguments}: {message}");
+            assert!(message.starts_with("error: invalid value '"), "{arguments}: {message}");
+        }
+        let message = parsed("log --seconds 99999999999999999999").expect_err("too many");
+        assert!(message.contains("'--seconds <N>': it is out of range"), "{message}");
     }
 }

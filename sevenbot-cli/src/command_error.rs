@@ -24,7 +24,7 @@ pub(crate) const INTERRUPTED: u8 = 130;
 const SAFETY: [&str; 3] = [
     "if a person or an object is in its way, switch off the supply of the servos; the arm then falls",
     "is the cable plugged in at both ends, and the baud rate right (--baud)?",
-    "then `sevenbot stop` again",
+    "then send a stop: `sevenbot stop`",
 ];
 
 /// Why a command fails.
@@ -113,6 +113,13 @@ impl From<MoveError> for CommandError {
                 "the arm's motors are in state {state}, {}: use `sevenbot state servo` first",
                 motor_state_name(state)
             )),
+            not_reached @ MoveError::NotReached { .. } => Self::WithAdvice {
+                message: not_reached.to_string(),
+                advice: &[
+                    "is something in the way of the joint, or its load too heavy? `sevenbot status` names blocked joints",
+                    "did an earlier move still turn it? `sevenbot stop`, then try again",
+                ],
+            },
             other => Self::Arm(other.to_string()),
         }
     }
@@ -124,7 +131,7 @@ fn too_far(far: &StartTooFar) -> CommandError {
         message: format!("{far}. The arm was not sent there"),
         advice: &[
             "--approach SECONDS goes there smoothly first: look that the way is free",
-            "or move the arm there yourself: `sevenbot pose --speed 10 --wait`, or `sevenbot home`",
+            "or move the arm there yourself: `sevenbot pose A1 A2 A3 A4 A5 A6 A7 --speed 10 --wait`, or `sevenbot home`",
         ],
     }
 }
@@ -246,7 +253,7 @@ impl CommandError {
             }
             Self::Problems(problems) => problem_advice(problems),
             Self::MayMove(_) => SAFETY.map(str::to_owned).to_vec(),
-            Self::Open { error, .. } => advice::opening(error),
+            Self::Open { port, error } => advice::opening(port, error),
             Self::Exchange(error) => owned(advice::exchange(error)),
             Self::Servo { error, .. } => owned(advice::servo(error)),
             Self::WithAdvice { advice, .. } => owned(advice),
@@ -281,4 +288,19 @@ fn no_servo(has_echo: bool) -> Vec<String> {
         "is the arm's controller off the bus? Two masters disturb each other",
     ];
     owned(&[echo, &checks].concat())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sevenbot::Joint;
+
+    #[test]
+    fn a_pose_that_is_not_reached_comes_with_advice() {
+        let [joint, ..] = Joint::ALL;
+        let error = MoveError::NotReached { away: vec![(joint, 90, 93)], missing: 0, retargeted: 0 };
+        let error = CommandError::from(error);
+        assert_eq!(error.status(), 1);
+        assert!(error.advice().concat().contains("`sevenbot status` names blocked joints"), "{error:?}");
+    }
 }

@@ -69,6 +69,9 @@ pub(crate) fn hold_on_interrupt<T>(
         warn("the arm may be moving: switch off the supply of the servos if something is in its way");
     }
     if !Interrupt::is_requested() {
+        if matches!(done, Err(CommandError::Problems(_))) {
+            warn_about_moving_joints(arm);
+        }
         return done;
     }
     let interrupt = Interrupt::catch();
@@ -77,6 +80,16 @@ pub(crate) fn hold_on_interrupt<T>(
     report_hold(&held?);
     interrupt.check()?;
     done
+}
+
+/// Warns about joints that still move although one of them has ended the move.
+fn warn_about_moving_joints(arm: &mut Arm) {
+    if let Ok(Some(status)) = arm.status()
+        && status.moving() != 0
+    {
+        let moving = register_text::joints(status.moving());
+        warn(format_args!("still moving: {moving}; `sevenbot stop` makes the arm hold"));
+    }
 }
 
 /// Makes the arm hold its position, and watches whether it does. Warns about joints that may not.

@@ -41,7 +41,6 @@ use std::io;
 use std::process::ExitCode;
 use std::time::Duration;
 
-use clap::Parser;
 use sevenbot::ArmOptions;
 use tracing_subscriber::filter::LevelFilter;
 use tracing_subscriber::fmt::time::uptime;
@@ -51,7 +50,8 @@ use crate::printer::Printer;
 use crate::session::Session;
 
 fn main() -> ExitCode {
-    let Cli { global, command } = Cli::parse();
+    let Cli { global, command } =
+        Cli::from_arguments(std::env::args_os()).unwrap_or_else(|error| error.exit());
     if global.verbose {
         show_frames();
     }

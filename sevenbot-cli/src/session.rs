@@ -4,6 +4,7 @@ use std::fs::File;
 use std::io::ErrorKind;
 use std::path::PathBuf;
 
+use sevenbot::health::sentences;
 use sevenbot::network::{self, Address};
 use sevenbot::ports::{self, PortInfo, ProbeResult};
 use sevenbot::wire_log::LoggedLine;
@@ -58,11 +59,12 @@ impl Session {
         }
     }
 
-    /// As [`Self::connect`], for a command that moves the arm: [`put_right`].
+    /// As [`Self::connect`], for a command that moves the arm: [`put_right`]. Warns of an alarm, which ends no move by itself.
     pub(crate) fn connect_to_move(&self) -> Result<Arm, CommandError> {
         let mut arm = self.connect()?;
         arm.let_watchdog_act()?;
         put_right(&mut arm)?;
+        warn_of_alarms(&mut arm)?;
         Ok(arm)
     }
 
@@ -120,6 +122,16 @@ pub(crate) fn put_right(arm: &mut Arm) -> Result<(), CommandError> {
             "a program ended while it streamed, and the arm's watchdog acted: its period, watchdog and reports are switched \
              off, and speeds at the maximum have their default again",
         );
+    }
+    Ok(())
+}
+
+/// Warns if a servo has an alarm: its joint may hold no torque.
+fn warn_of_alarms(arm: &mut Arm) -> Result<(), CommandError> {
+    let mut problems = arm.health()?.problems();
+    problems.retain(|problem| problem.kind.is_alarm());
+    if !problems.is_empty() {
+        warn(format_args!("{}; `sevenbot status` tells what to do", sentences(&problems)));
     }
     Ok(())
 }

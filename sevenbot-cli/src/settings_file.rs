@@ -31,6 +31,9 @@ use crate::printer::Printable;
 /// The version of the file format. Other versions are refused.
 const FORMAT: u32 = 1;
 
+/// What to do about a setting that is wrong.
+const REMEDY: &str = "correct the line or delete it, or write a new file with `sevenbot backup FILE`";
+
 /// More than any file of settings, in bytes.
 const LONGEST: u64 = 1_000_000;
 
@@ -74,7 +77,9 @@ impl SettingsFile {
     /// Reads a file of this format, up to [`LONGEST`] bytes.
     pub(crate) fn read(path: &Path) -> Result<Self, CommandError> {
         let text = input_file::short_text(path, LONGEST)?;
-        let file: Self = toml::from_str(&text).map_err(|error| CommandError::file(path, error))?;
+        let file: Self = toml::from_str(&text).map_err(|error| {
+            CommandError::file(path, format!("this is no settings file of `sevenbot backup`: {error}"))
+        })?;
         if file.format == FORMAT {
             Ok(file)
         } else {
@@ -96,7 +101,8 @@ impl SettingsFile {
         let (mut wanted, mut missing) = (now.clone(), Vec::new());
         for (name, value) in &self.settings {
             let row = settings().find(|row| name_of(row) == *name);
-            let row = row.ok_or_else(|| CommandError::file(path, format!("{name} is not a setting")))?;
+            let row =
+                row.ok_or_else(|| CommandError::file(path, format!("{name} is not a setting: {REMEDY}")))?;
             let bytes = bytes(row, value).map_err(|reason| CommandError::file(path, reason))?;
             if serves(row.address) {
                 let places = (row.address..).zip(bytes);
@@ -137,7 +143,7 @@ fn bytes(row: &Register, value: &Value) -> Result<Vec<u8>, String> {
     let values = value.as_array().map_or(std::slice::from_ref(value), Vec::as_slice);
     if values.len() != usize::from(row.count) {
         let (name, count, given) = (name_of(row), row.count, values.len());
-        return Err(format!("{name} has {given} values, not {count}"));
+        return Err(format!("{name} has {given} values, not {count}: {REMEDY}"));
     }
     (row.address..).zip(values).map(|(address, value)| byte(row, address, value)).collect()
 }
@@ -206,12 +212,12 @@ mod tests {
 
     #[test]
     fn unknown_names_and_values_out_of_range_are_refused() {
-        assert_eq!(refused("speed = 5"), "speed is not a setting");
+        assert_eq!(refused("speed = 5"), format!("speed is not a setting: {REMEDY}"));
         assert_eq!(
             refused("offset = [0, 17, 0, 0, 0, 0, 0]"),
             "17 is out of range: offset.2 takes -16 to 16"
         );
-        assert_eq!(refused("offset = [1]"), "offset has 1 values, not 7");
+        assert_eq!(refused("offset = [1]"), format!("offset has 1 values, not 7: {REMEDY}"));
         assert_eq!(refused("device-id = 300"), "300 is out of range: device-id takes 0 to 255");
         assert_eq!(refused("device-id = 'x'").split(':').count(), 2);
         assert_eq!(refused("baud-rate = 5"), "the arm does not support 5 baud");

@@ -1,5 +1,7 @@
 //! The target of a relative step.
 
+use std::fmt::Display;
+
 use sevenbot::Joint;
 use sevenbot::joints::{JointSnapshot, StepBaseError};
 
@@ -18,4 +20,10 @@ pub(crate) fn step_target(joints: &JointSnapshot, joint: Joint, degrees: i16) ->
         ))
     })?;
     Ok(i16::from(base).saturating_add(degrees))
+}
+
+/// The error of a step that leaves the range of the joint.
+pub(crate) fn out_of_range(joint: Joint, degrees: impl Display) -> CommandError {
+    let number = joint.number();
+    CommandError::Arm(format!("joint {number} would go to {degrees}°: it takes 0 to 180; nothing was moved"))
 }

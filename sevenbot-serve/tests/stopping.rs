@@ -405,13 +405,11 @@ fn with_read_only_access_nothing_but_reads_is_sent() {
 /// The maker's `stop`. Returns its answer.
 fn makers_stop(world: &mut World) -> String {
     world.send_message(0, r#"{"cmd":"stop"}"#);
-    for _ in 0..2_000 {
+    let answer = (0..2_000).find_map(|_| {
         world.run(1);
-        if let Some((_, answer)) = world.pages[0].answers.pop() {
-            return answer;
-        }
-    }
-    panic!("no answer");
+        world.pages[0].answers.pop()
+    });
+    answer.expect("an answer").1
 }
 
 #[test]

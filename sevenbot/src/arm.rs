@@ -178,10 +178,14 @@ impl Arm {
 
     /// Runs `work` with at least three attempts for each read.
     pub(crate) fn with_min_attempts<T>(&mut self, work: impl FnOnce(&mut Self) -> T) -> T {
-        let attempts = self.options.attempts;
-        self.options.attempts = attempts.max(MIN_ATTEMPTS);
+        self.with_attempts(self.options.attempts.max(MIN_ATTEMPTS), work)
+    }
+
+    /// Runs `work` with this number of attempts for each read.
+    pub(crate) fn with_attempts<T>(&mut self, attempts: u32, work: impl FnOnce(&mut Self) -> T) -> T {
+        let before = std::mem::replace(&mut self.options.attempts, attempts);
         let done = work(self);
-        self.options.attempts = attempts;
+        self.options.attempts = before;
         done
     }
 

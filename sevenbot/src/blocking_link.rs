@@ -108,7 +108,9 @@ impl BlockingLink {
 
     /// The counts since the last call.
     pub(crate) fn take_received(&mut self) -> ReceiveCounts {
-        std::mem::take(&mut self.received)
+        let received = std::mem::take(&mut self.received);
+        self.received.earlier_frames = received.earlier_frames + received.other_frames;
+        received
     }
 
     fn send(&mut self, frame: &[u8]) -> Result<(), PortError> {

@@ -3,104 +3,27 @@
 //! The arm does not answer a write ([D6](protocol_core::decisions#d6)). So the registers are read back. The register
 //! table and the status block give the reason for a difference.
 
-use std::fmt;
-
 use protocol_core::registers::map::{EEPROM_LOCK, FEEDBACK_FREQUENCY, MOTOR_STATE, motor_state};
 use protocol_core::registers::map21::find_readable;
 
 use crate::arm::Arm;
 use crate::error::Error;
 use crate::identity::Firmware;
-use crate::names::name_of_register;
 use crate::status_block::StatusBlock;
 use host_link::{Snapshot, Span};
 
 mod cause;
+mod mismatch;
+mod put_back;
 mod server;
+mod storage;
 
 pub(crate) use cause::cause_from_counters;
 pub use cause::{MismatchCause, ServerReason};
 use cause::{cause_from_access, cause_from_arm, cause_from_range};
-
-/// A register that does not hold what was written to it.
-///
-/// ```
-/// use sevenbot::checked_write::{MismatchCause, WriteMismatch};
-///
-/// let refused = WriteMismatch { address: 11, wanted: 42, found: 0, cause: MismatchCause::Locked };
-/// assert_eq!(refused.to_string(), "device-id is 0, not 42: it is protected by the EEPROM lock");
-/// ```
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct WriteMismatch {
-    /// The register.
-    pub address: u8,
-    /// The raw value that was written: one byte, or two with the low byte first.
-    pub wanted: u16,
-    /// The raw value that was read back.
-    pub found: u16,
-    /// The reason.
-    pub cause: MismatchCause,
-}
-
-/// Registers that do not hold what was written to them: at least one.
-///
-/// ```
-/// use sevenbot::checked_write::{MismatchCause, NotTaken, WriteMismatch};
-///
-/// let locked = WriteMismatch { address: 11, wanted: 42, found: 0, cause: MismatchCause::Locked };
-/// let error = NotTaken::check(vec![locked]).expect_err("one register differs");
-/// assert_eq!(error.to_string(), "device-id is 0, not 42: it is protected by the EEPROM lock");
-/// assert_eq!(NotTaken::check(Vec::new()), Ok(()));
-/// ```
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{}", reasons(.0))]
-pub struct NotTaken(Vec<WriteMismatch>);
-
-impl NotTaken {
-    /// Fails if there is a register that differs.
-    ///
-    /// # Errors
-    /// All these registers.
-    pub fn check(differing: Vec<WriteMismatch>) -> Result<(), Self> {
-        if differing.is_empty() { Ok(()) } else { Err(Self(differing)) }
-    }
-
-    /// The registers, in the order of the writes.
-    #[must_use]
-    pub fn registers(&self) -> &[WriteMismatch] {
-        &self.0
-    }
-
-    /// Is a register protected by the EEPROM lock?
-    #[must_use]
-    pub fn is_locked(&self) -> bool {
-        self.0.iter().any(|register| register.cause == MismatchCause::Locked)
-    }
-}
-
-/// Why a verified write failed.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum WriteError {
-    /// These registers did not take their values.
-    #[error(transparent)]
-    NotTaken(#[from] NotTaken),
-    /// An exchange with the arm failed. The arm may have taken some of the values.
-    #[error(transparent)]
-    Exchange(#[from] Error),
-}
-
-impl WriteError {
-    /// Is it unknown whether the arm carries out the write?
-    #[must_use]
-    pub fn is_uncertain(&self) -> bool {
-        match self {
-            Self::NotTaken(not_taken) => {
-                not_taken.registers().iter().any(|register| register.cause.is_transient())
-            }
-            Self::Exchange(_) => true,
-        }
-    }
-}
+use mismatch::number;
+pub use mismatch::{NotTaken, WriteError, WriteMismatch, reasons};
+use storage::not_stored;
 
 /// A frame is sent this many times before its loss is an error.
 const WRITE_ATTEMPTS: u32 = 5;
@@ -121,7 +44,7 @@ impl Arm {
     /// ```
     ///
     /// # Errors
-    /// [`WriteError::NotTaken`] with each register that differs, and why. Or the errors of [`Arm::read`] and
+    /// [`WriteError::NotTaken`] with each register that differs or is not stored, and why. Or the errors of [`Arm::read`] and
     /// [`Arm::write`].
     pub fn write_checked(&mut self, address: u8, values: &[u8]) -> Result<(), WriteError> {
         self.write_all_checked(&[(address, values.to_vec())])
@@ -217,6 +140,9 @@ impl Arm {
                 }
             }
             if lost.is_empty() {
+                if unchanged.is_empty() {
+                    unchanged = not_stored(writes, after.as_ref());
+                }
                 break;
             }
             (before, sending) = (after, lost);
@@ -292,37 +218,6 @@ fn raw_values(snapshot: &Snapshot) -> Vec<(u8, u16)> {
         values.push((address, if is_whole { snapshot.word(address) } else { snapshot.at(address).into() }));
     }
     values
-}
-
-/// The number that a raw value encodes. Minus zero is zero (D9).
-fn number(address: u8, raw: u16) -> i32 {
-    find_readable(address).map_or(i32::from(raw), |row| row.range.decode(raw))
-}
-
-/// The reasons, one for all neighbouring registers that share it, each on its own line.
-#[must_use]
-pub fn reasons(unchanged: &[WriteMismatch]) -> String {
-    let groups = unchanged.chunk_by(|one, next| one.cause == next.cause);
-    groups.map(reason).collect::<Vec<String>>().join("\n       ")
-}
-
-/// One reason for all registers that share it.
-fn reason(unchanged: &[WriteMismatch]) -> String {
-    match unchanged {
-        [only] => only.to_string(),
-        [first, .., last] => {
-            let (from, to) = (name_of_register(first.address), name_of_register(last.address));
-            format!("{from} to {to} did not change: {}", first.cause)
-        }
-        [] => String::new(),
-    }
-}
-
-impl fmt::Display for WriteMismatch {
-    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (found, wanted) = (number(self.address, self.found), number(self.address, self.wanted));
-        write!(out, "{} is {found}, not {wanted}: {}", name_of_register(self.address), self.cause)
-    }
 }
 
 #[cfg(test)]

@@ -135,6 +135,8 @@ pub struct ReceiveCounts {
     pub other_frames: usize,
     /// Frames with a wrong checksum.
     pub damaged_frames: usize,
+    /// Good frames that the same line delivered before this exchange.
+    pub earlier_frames: usize,
 }
 
 impl fmt::Display for ReceiveCounts {
@@ -177,7 +179,8 @@ mod tests {
         assert_eq!(nothing, "no answer to a read of 54..60 in 1500 ms: nothing was received");
         let garbage = said(ReceiveCounts { bytes: 12, ..ReceiveCounts::default() });
         assert!(garbage.ends_with("12 bytes were received, none of them a frame"), "{garbage}");
-        let frames = said(ReceiveCounts { bytes: 50, other_frames: 2, damaged_frames: 1, echoes: 0 });
+        let frames =
+            said(ReceiveCounts { bytes: 50, other_frames: 2, damaged_frames: 1, ..ReceiveCounts::default() });
         assert!(frames.ends_with("1 damaged and 2 other frames were received"), "{frames}");
     }
 }

@@ -1,7 +1,9 @@
 //! Typed access to the extended block, registers 128 to 191: hundredths of a degree, velocities, loads
 //! ([D21](protocol_core::decisions#d21) to [D26](protocol_core::decisions#d26)).
 
-use protocol_core::registers::map::{EXTENDED_VERSION, FINE_POSITION, FINE_TARGET, SET_POINT_PERIOD};
+use protocol_core::registers::map::{
+    EXTENDED_VERSION, FINE_POSITION, FINE_TARGET, HOST_WATCHDOG, SET_POINT_PERIOD,
+};
 use protocol_core::registers::map21::Map;
 
 use crate::arm::Arm;
@@ -11,10 +13,11 @@ use crate::fine_angle::FineAngle;
 pub use crate::fine_state::{FineState, FineTargets};
 use crate::identity::Firmware;
 use crate::joints::frames_of;
-use host_link::Span;
+use host_link::{Snapshot, Span};
 
 /// The layout of the extended block that this library knows.
 pub(crate) const KNOWN_LAYOUT: u8 = 1;
+const PERIOD_AND_WATCHDOG: Span = Span::between(&SET_POINT_PERIOD, &HOST_WATCHDOG);
 
 impl Arm {
     /// Does the arm have the extended block? Only this project's firmware has it, and only in map 2.2.
@@ -72,21 +75,30 @@ impl Arm {
     }
 
     /// Runs `work` while fine targets are no points of a stream (D23), and restores the set-point period, also after a
-    /// failure. Only for an arm with the extended block.
+    /// failure. A stream whose program has ended it meanwhile, with its watchdog, stays off. Only for an arm with the extended
+    /// block.
     pub(crate) fn without_set_point_period<T>(
         &mut self,
         work: impl FnOnce(&mut Self) -> Result<T, WriteError>,
     ) -> Result<T, WriteError> {
-        let period = self.read_span(Span::of(&SET_POINT_PERIOD))?;
-        if period.word(SET_POINT_PERIOD.address) == 0 {
+        let before = self.read_span(PERIOD_AND_WATCHDOG)?;
+        if before.word(SET_POINT_PERIOD.address) == 0 {
             return work(self);
         }
         self.write(SET_POINT_PERIOD.address, &[0, 0])?;
         let done = work(self);
-        let restored = self.write_checked(SET_POINT_PERIOD.address, &period.values);
+        let restored = self.restore_period(&before);
         let done = done?;
         restored?;
         Ok(done)
+    }
+
+    fn restore_period(&mut self, before: &Snapshot) -> Result<(), WriteError> {
+        let watchdog = |registers: &Snapshot| registers.byte(&HOST_WATCHDOG);
+        if watchdog(&self.read_span(PERIOD_AND_WATCHDOG)?) != watchdog(before) {
+            return Ok(());
+        }
+        self.write_checked(SET_POINT_PERIOD.address, &before.word(SET_POINT_PERIOD.address).to_le_bytes())
     }
 }
 

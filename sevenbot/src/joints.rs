@@ -19,7 +19,7 @@ use protocol_core::registers::{Joint, Register};
 
 use crate::arm::Arm;
 use crate::error::Error;
-use crate::status_block::{StatusBlock, has_restarted};
+use crate::status_block::StatusBlock;
 use crate::units::Speed;
 use host_link::{Snapshot, Span};
 
@@ -172,12 +172,11 @@ impl JointSnapshot {
         self.status.as_ref().is_some_and(|status| status.is_moving(joint))
     }
 
-    /// Has the controller restarted since this earlier instant? `false` without a status block.
+    /// Has the controller restarted since this earlier instant, a few seconds ago at most? `false` without a status block.
     #[must_use]
     pub fn has_restarted_since(&self, before: &Self) -> bool {
-        let counters = before.status.as_ref().zip(self.status.as_ref());
-        counters
-            .is_some_and(|(before, after)| has_restarted(before.frames_accepted(), after.frames_accepted()))
+        let statuses = before.status.as_ref().zip(self.status.as_ref());
+        statuses.is_some_and(|(before, after)| after.has_restarted_since(before))
     }
 
     /// The base of a relative step of this joint: its target, in degrees.

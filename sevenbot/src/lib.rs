@@ -26,6 +26,7 @@
 
 #![forbid(unsafe_code)]
 
+#[cfg(feature = "serial")]
 pub mod advice;
 pub mod approach;
 pub mod arm;

@@ -17,7 +17,7 @@ use host_link::Span;
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum NameError {
     /// No register name starts with the text, and it is not a number.
-    #[error("there is no register of this name")]
+    #[error("there is no register of this name: `sevenbot registers` lists the names")]
     Unknown,
     /// Several register names start with the text.
     #[error("this could be {}", .0.iter().map(|row| name_of(row)).collect::<Vec<_>>().join(" or "))]
@@ -35,7 +35,7 @@ pub enum NameError {
     #[error("the range ends before it begins")]
     EmptyRange,
     /// The range has all 256 registers, and one frame holds 255.
-    #[error("one frame holds 255 registers, and this range has 256: use 0..254 and 255")]
+    #[error("one frame holds 255 registers, and this range has 256: split it into 0..254 and 255")]
     TooLong,
 }
 

@@ -55,7 +55,7 @@ impl OpenPort {
 
 impl OpenPort {
     /// For how many bytes a read may ask. On Windows it may wait until all are there: that it returns with the first ones is a
-    /// rule for one combination of time-outs, which Wine and some drivers lack.
+    /// rule for one combination of timeouts, which Wine and some drivers lack.
     fn readable_length(&self, longest: usize) -> serialport::Result<usize> {
         if !cfg!(windows) {
             return Ok(longest);

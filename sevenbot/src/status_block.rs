@@ -42,13 +42,20 @@ impl Arm {
     }
 }
 
-/// A counter of frames that seems to have gone back by less than half its range was reset.
-const HALF_COUNTER: u16 = u16::MAX / 2;
+/// Two readings of the counter of frames that follow each other are at most this far apart, if they are a few seconds apart: more
+/// than 2 s of the shortest frames at 115200 baud.
+const FRAMES_BETWEEN_READINGS: u32 = 4_096;
 
-/// Has the controller restarted between two readings of its counter of frames? A restart sets it to 0.
-pub(crate) const fn has_restarted(before: u16, after: u16) -> bool {
-    let went_back = before.wrapping_sub(after);
-    went_back != 0 && went_back <= HALF_COUNTER
+/// Has the controller restarted between two readings of its counter of frames? A restart sets the counter to 0. So the second
+/// reading is behind the first, which looks like a long way forward, because the counter wraps. `frames` is the number of frames
+/// that the arm can have accepted since the first reading, besides 4,096.
+///
+/// A restart remains undetected
+/// - if the first reading was less than 4,096 and `frames` before the counter wraps,
+/// - if the arm has accepted more frames since the restart than before it,
+/// - at all readings that are so far apart that `frames` reaches the range of the counter: 37 s at 115200 baud.
+pub(crate) fn has_restarted(before: u16, after: u16, frames: u32) -> bool {
+    u32::from(after.wrapping_sub(before)) > frames.saturating_add(FRAMES_BETWEEN_READINGS)
 }
 
 impl From<Snapshot> for StatusBlock {
@@ -114,6 +121,11 @@ impl StatusBlock {
         self.0.counter(&FRAMES_ACCEPTED)
     }
 
+    /// Has the controller restarted since this earlier reading, which is a few seconds old at most?
+    pub(crate) fn has_restarted_since(&self, before: &Self) -> bool {
+        has_restarted(before.frames_accepted(), self.frames_accepted(), 0)
+    }
+
     /// Number of frames with a wrong CRC; wraps.
     #[must_use]
     pub fn frames_corrupted(&self) -> u16 {
@@ -144,5 +156,22 @@ impl StatusBlock {
     pub fn hottest_celsius(&self) -> Option<u8> {
         let degrees = self.0.byte(&SERVO_TEMPERATURE);
         (degrees != 0).then_some(degrees)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_counter_of_frames_that_begins_again_tells_of_a_restart() {
+        assert!(!has_restarted(7, 7, 0) && !has_restarted(65_500, 300, 0), "it wraps");
+        assert!(has_restarted(200, 3, 0), "early");
+        assert!(has_restarted(33_000, 12, 0) && has_restarted(60_000, 12, 0), "after half the range");
+        assert!(!has_restarted(65_000, 12, 0), "undetected: the counter could have wrapped");
+        assert!(
+            has_restarted(0, 33_000, 0) && !has_restarted(0, 33_000, 30_000),
+            "more time between the readings"
+        );
     }
 }

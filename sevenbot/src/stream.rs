@@ -33,7 +33,7 @@ pub use latest::{LatestCounts, LatestPoints, LatestStep};
 pub use pace::{PaceCounts, StreamPace};
 
 /// The registers that a stream sets: period, time of the watchdog, action of the watchdog.
-const STREAM_REGISTERS: Span = Span::between(&SET_POINT_PERIOD, &WATCHDOG_ACTION);
+pub(crate) const STREAM_REGISTERS: Span = Span::between(&SET_POINT_PERIOD, &WATCHDOG_ACTION);
 /// No stream, no watchdog.
 const SWITCHED_OFF: [u8; 4] = [0; 4];
 /// The unit of the watchdog's time.
@@ -203,8 +203,8 @@ impl<'a> SetPointStream<'a> {
     /// Does the arm follow? Asks it ten times a second, and never waits for its answer. Call it at least that often.
     ///
     /// # Errors
-    /// A joint of the stream is blocked, let go or silent, the supply was lost, the controller restarted, the motors are off, or
-    /// the arm does not answer any more.
+    /// A joint of the stream is blocked, let go or silent, the supply was lost, the controller restarted, the motors are off,
+    /// another program stopped the arm, or the arm does not answer any more.
     pub fn check(&mut self) -> Result<(), MoveCheckError> {
         self.check.poll(self.arm)
     }
@@ -263,6 +263,12 @@ impl<'a> SetPointStream<'a> {
     /// The arm, for other requests and its reports during the stream.
     pub fn arm(&mut self) -> &mut Arm {
         self.arm
+    }
+
+    /// Leaves the registers as they are, because the connection is lost: the watchdog of the arm acts, and
+    /// [`Arm::end_abandoned_stream`] of the next program switches the stream off.
+    pub(crate) fn leave_to_watchdog(mut self) {
+        self.before = None;
     }
 
     /// Puts the registers back, and verifies them.

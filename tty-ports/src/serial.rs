@@ -22,7 +22,7 @@ const SHORTEST_LATENCY_MS: u32 = 1;
 #[derive(Debug, thiserror::Error)]
 pub enum SerialError {
     /// The path does not exist.
-    #[error("{}: there is no such port: plug the adapter in; ports that are there: {}", path.display(), ports())]
+    #[error("{}: there is no such port: plug the cable in; ports that are there: {}", path.display(), ports())]
     Absent {
         /// The port.
         path: PathBuf,

@@ -191,7 +191,7 @@ impl ProgramRun {
         if pause > LONGEST_PAUSE { Err(ProgramFailure::Arm(PlayFailure::Paused(pause))) } else { Ok(()) }
     }
 
-    /// Fails if the arm carries out nothing, or another program has stopped it.
+    /// Fails if the arm does not do what the program wants, or another program has stopped it.
     fn watch(&mut self, now: Instant, client: &Client) -> Result<(), ProgramFailure> {
         if client.rounds() != self.watched_round {
             self.watched_round = client.rounds();

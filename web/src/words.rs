@@ -215,6 +215,7 @@ fn move_fault(language: Language, fault: &MoveFault) -> String {
         }
         MoveFault::NotDriven { .. } => language.text("motors-are-off").to_owned(),
         MoveFault::Silent => language.text("lost").to_owned(),
+        MoveFault::StoppedByAnother => language.text("stopped-by-another").to_owned(),
     }
 }
 

@@ -1,4 +1,4 @@
-//! The plugin for LeRobot: tested with LeRobot's base classes alone, and in the long run with all of LeRobot.
+//! Tests the plugin for LeRobot with LeRobot's base classes alone, and with all of LeRobot.
 
 use std::env;
 use std::fs;
@@ -11,7 +11,7 @@ use crate::venv::{self, pip};
 
 /// LeRobot without what it depends on: some gigabytes, of which its base classes need little.
 const LEROBOT: &str = "lerobot==0.6.1";
-/// What the base classes import. They name torch, too, in annotations only: the tests have a module of this name.
+/// What the base classes import. They use torch in annotations only: the tests have an empty module of this name.
 const BASE_PACKAGES: [&str; 5] =
     ["draccus==0.11.6", "numpy==2.2.6", "huggingface-hub==1.33.0", "packaging==25.0", "tqdm==4.70.1"];
 /// All of LeRobot that its commands for robots need.

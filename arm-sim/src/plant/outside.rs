@@ -13,7 +13,7 @@ use protocol_core::registers::Joint;
 use super::Plant;
 use super::pose::AngleScale;
 
-/// What another simulation measured of a joint, without any offset.
+/// The state of a joint in another simulation. The offsets of registers 13 to 19 are not in it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct OutsideState {
     /// In thousandths of a degree.

@@ -82,7 +82,7 @@ pub(super) struct Supply {
 }
 
 impl Supply {
-    /// Sets or removes the fault.
+    /// Sets or removes the fault. Its first period begins `now`; the power switch keeps its position.
     pub(super) fn set_fault(&mut self, now: Instant, fault: Option<SupplyFault>) {
         let is_switched_off = self.is_switched_off;
         *self = Self { fault, since: now, is_switched_off, ..Self::default() };

@@ -9,7 +9,7 @@ use crate::fault_count::FaultCount;
 /// The damage of [`ServoFault::Garbled`] to a checksum.
 const DAMAGE: u8 = 0x55;
 
-/// The fault of a servo, if it has one.
+/// The fault of a servo, if it has one, with its timer and the number of its effects.
 #[derive(Clone, Debug)]
 pub(super) struct FaultState {
     fault: Option<ServoFault>,

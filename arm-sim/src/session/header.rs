@@ -86,7 +86,7 @@ pub enum HeaderError {
     )]
     NoSession,
     /// A value is missing or wrong.
-    #[error("its first two lines have no good value of {0}")]
+    #[error("the value of {0} in its first two lines is missing or wrong: record the session again")]
     Value(&'static str),
 }
 

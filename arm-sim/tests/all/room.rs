@@ -146,7 +146,7 @@ fn a_thing_that_is_pushed_moves_with_what_stands_on_it_and_a_wall_stops_it() {
     assert!(low.x < -20.0, "pushed: {low:?}");
     assert!((high.x - low.x).abs() < 4.0 && high.z > low.z, "it rides: {high:?}");
     assert!(next.x < -61.0, "the next one, too: {next:?}");
-    // The base turns on to the left.
+    // The base turns further to the left.
     room.write(46, &[150]);
     let (low, next) = (room.place("low"), room.place("next"));
     assert!(next.x > -101.0 && low.x > -62.0, "the wall stops both: {next:?} {low:?}");

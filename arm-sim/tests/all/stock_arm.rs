@@ -52,7 +52,6 @@ impl Bench {
         assert_eq!(self.arm.host_send(self.now, &bytes), bytes.len());
     }
 
-    /// Reads registers.
     fn read(&mut self, address: u8, count: u8) -> Vec<u8> {
         self.send(&[3, address, count]);
         let reply = self.after(100);

@@ -89,7 +89,7 @@ impl<F: NorFlash + Clone, C: ArmController> Executor<'_, F, C> {
     /// Refuses if the arm has no power.
     fn act_with_power(&mut self, action: Action) -> Result<Value, ControlRefusal> {
         if !self.arm.simulation_mut().has_power() {
-            let hint = "switch it on first: {\"do\":\"power\",\"to\":\"on\"}";
+            let hint = "`sevenbot sim power on` switches it on";
             return Err(ControlRefusal::new("the arm has no power", hint));
         }
         self.act(action);
@@ -152,13 +152,14 @@ impl<F: NorFlash + Clone, C: ArmController> Executor<'_, F, C> {
 
     fn end_faults(&mut self, at: Option<&str>) -> Result<Value, ControlRefusal> {
         let location: Result<Option<FaultLocation>, _> = at.map(str::parse).transpose();
-        let location = location
-            .map_err(|error| ControlRefusal::new(error, "{\"do\":\"clear\"} takes all faults back"))?;
+        let location = location.map_err(|error| {
+            ControlRefusal::new(error, "`sevenbot sim fault clear` takes all faults back")
+        })?;
         let ended = self.act(Action::Clear(location));
         if ended.is_empty() {
             return Err(ControlRefusal::new(
                 "there is no such fault",
-                "{\"do\":\"faults\"} lists the faults",
+                "`sevenbot sim fault list` lists the faults",
             ));
         }
         Ok(json!({ "ended": ended }))
@@ -224,7 +225,7 @@ impl<F: NorFlash + Clone, C: ArmController> Executor<'_, F, C> {
             (Power::On, true) => {
                 return Err(ControlRefusal::new(
                     "the power is on",
-                    "{\"do\":\"power\",\"to\":\"cycle\"} switches it off and on",
+                    "`sevenbot sim power cycle` switches it off and on",
                 ));
             }
             (Power::On, false) | (Power::Cycle, _) => Action::PowerCycle,

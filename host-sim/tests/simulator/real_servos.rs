@@ -248,7 +248,7 @@ fn a_port_that_cannot_be_used_is_refused_in_one_line() {
     assert!(said.contains("another program uses the port") && said.contains("fuser"), "{said}");
     let absent = rig.folder.path().join("ttyUSB0");
     let said = refused(&["--eeprom", "none", "--servos", absent.to_str().unwrap()]);
-    assert!(said.contains("there is no such port: plug the adapter in"), "{said}");
+    assert!(said.contains("there is no such port: plug the cable in"), "{said}");
     for wrong in ["/dev/null", rig.folder.path().to_str().unwrap()] {
         let said = refused(&["--eeprom", "none", "--servos", wrong]);
         assert!(said.contains("that is no serial port"), "{said}");

@@ -114,8 +114,8 @@ def hand(tmp_path: Path) -> Path:
 def slow_hand(tmp_path: Path) -> Path:
     """A hand that moves joints at up to 7 degrees a second.
 
-    The emulator has the time of the computer. On a busy one it stands still for 0.1 to 0.3 s, and then each joint catches up at a speed of
-    its own, off the path by up to the way that it missed. So the path is as exact as the hand is slow.
+    The emulator runs in real time. A busy computer stops it for 0.1 to 0.3 s, and then the joints catch up at different speeds.
+    They leave the path by no more than the distance that they missed, so a slow hand keeps the error small.
     """
     return led(tmp_path / "hand.txt", 1 / 5)
 

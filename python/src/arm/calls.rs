@@ -6,7 +6,7 @@ use pyo3::prelude::*;
 use sevenbot::approach::ApproachRule;
 use sevenbot::cartesian::{Guard, TipTarget};
 use sevenbot::fine::FineTargets;
-use sevenbot::moves::{GuardedMoveError, Pace, TipMove};
+use sevenbot::moves::{GuardedMoveError, MoveError, Pace, TipMove};
 
 use super::Arm;
 use crate::arguments::LinePace;
@@ -32,7 +32,10 @@ impl Arm {
         pace: Pace,
         wait: bool,
     ) -> PyResult<Option<Angles>> {
-        let sent = self.worker.call(py, move |arm, _| motion::begin(arm, targets, pace))?;
+        let sent = self.worker.call(py, move |arm, watch| match watch.is_stopped() {
+            true => Err(MoveError::Interrupted),
+            false => motion::begin(arm, targets, pace),
+        })?;
         *lock(&self.sent) = Some(Arc::new(raised(py, sent)?));
         if wait { self.wait(py) } else { Ok(None) }
     }
@@ -113,6 +116,8 @@ impl Arm {
         if !self.worker.is_open() {
             return Ok(());
         }
+        // A call of another thread that runs would be waited for.
+        self.worker.interrupt();
         let held = self.worker.call(py, |arm, _| motion::hold_if_moving(arm));
         self.worker.close(py);
         held.and_then(|held| raised(py, held))

@@ -39,7 +39,8 @@ macro_rules! also {
         /// Adds the exceptions to the module.
         pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
             $(module.add(stringify!($name), $name::class(module.py())?)?;)*
-            Ok(())
+            // Not one of the public names.
+            module.setattr("_of_both", wrap_pyfunction!(_of_both, module)?)
         }
     };
 }
@@ -71,6 +72,40 @@ fn made<'py>(
     Ok(class.cast_into::<PyType>()?.unbind())
 }
 
+/// A class that is both, with the name of the first. It is not in the module, so it tells `pickle` how to make it again.
+fn both<'py>(ours: Bound<'py, PyType>, theirs: Bound<'py, PyType>) -> PyResult<Py<PyType>> {
+    let py = ours.py();
+    let (name, doc): (String, String) = (ours.name()?.extract()?, ours.getattr("__doc__")?.extract()?);
+    let class = made(py, &name, (ours, theirs), &doc)?;
+    // A function of Rust alone is no method.
+    let method = py.import("functools")?.call_method1("partialmethod", (wrap_pyfunction!(reduce, py)?,))?;
+    class.bind(py).setattr("__reduce__", method)?;
+    Ok(class)
+}
+
+/// `__reduce__` of a class that is both. Python's own class knows the arguments of the exception.
+#[pyfunction]
+fn reduce<'py>(error: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyTuple>> {
+    let py = error.py();
+    let (ours, theirs): (Bound<'py, PyAny>, Bound<'py, PyAny>) =
+        error.get_type().getattr("__bases__")?.extract()?;
+    let reduced = theirs.call_method1("__reduce__", (error,))?.cast_into::<PyTuple>()?.to_list();
+    reduced.set_item(1, (ours, theirs, reduced.get_item(1)?))?;
+    reduced.set_item(0, py.import("sevenbot._sevenbot")?.getattr("_of_both")?)?;
+    Ok(reduced.to_tuple())
+}
+
+/// An exception that is both: what `pickle` calls.
+#[pyfunction]
+fn _of_both<'py>(
+    ours: Bound<'py, PyType>,
+    theirs: Bound<'py, PyType>,
+    arguments: Bound<'py, PyTuple>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let py = ours.py();
+    both(ours, theirs)?.bind(py).call1(arguments)
+}
+
 /// The exception of a file: a [`FileError`] that is also what Python raises for this reason.
 pub(crate) fn file_error(py: Python<'_>, path: &std::path::Path, why: &io::Error) -> PyErr {
     let code = why.raw_os_error();
@@ -81,8 +116,7 @@ pub(crate) fn file_error(py: Python<'_>, path: &std::path::Path, why: &io::Error
         let theirs = py.get_type::<PyOSError>().call1((code, &text))?.get_type();
         let ours = FileError::class(py)?;
         let is_plain = ours.is_subclass(&theirs)?;
-        let class =
-            if is_plain { ours } else { made(py, "FileError", (ours, theirs), "A file.")?.into_bound(py) };
+        let class = if is_plain { ours } else { both(ours, theirs)?.into_bound(py) };
         Ok(PyErr::from_type(class, (code, text, path.to_owned())))
     };
     raise().unwrap_or_else(|error| error)
@@ -94,7 +128,7 @@ pub(crate) fn without_attribute(py: Python<'_>, error: PyErr) -> PyErr {
     if !error.is_instance_of::<Closed>(py) {
         return error;
     }
-    let made = || made(py, "Closed", (Closed::type_object(py), PyAttributeError::type_object(py)), "Closed.");
+    let both = || both(Closed::type_object(py), PyAttributeError::type_object(py));
     let message = error.value(py).to_string();
-    raised(CLASS.get_or_try_init(py, made).map(|class| class.bind(py).clone()), (message,))
+    raised(CLASS.get_or_try_init(py, both).map(|class| class.bind(py).clone()), (message,))
 }

@@ -43,14 +43,14 @@ impl Raise for sevenbot::Error {
     }
 }
 
-/// A hint of the command line, with the argument of this package.
+/// A hint of the command line, with the arguments of this package.
 fn in_python(hint: &str) -> String {
-    hint.replace("(--baud)", "(baud=)")
+    hint.replace("(--baud)", "(baud=)").replace("SEVENBOT_TOKEN set", "SEVENBOT_TOKEN or token= set")
 }
 
 /// A port that does not open, with its name.
 pub(crate) fn not_opened(py: Python<'_>, port: &str, why: &OpenError) -> PyErr {
-    let hints: Vec<String> = advice::opening(why).iter().map(|hint| in_python(hint)).collect();
+    let hints: Vec<String> = advice::opening(port, why).iter().map(|hint| in_python(hint)).collect();
     let message = format!("{port}: {why}");
     match why {
         OpenError::Silent(sevenbot::Error::NoAnswer { .. }) => error::<NoAnswer>(py, &message, &hints),
@@ -114,13 +114,14 @@ impl Raise for MoveError {
             Self::Stream(error) => error.raise(py),
             Self::Interrupted => error::<Interrupted>(py, &message, &[]),
             Self::NotDriven { .. } => error::<NotDriven>(py, &message, &driven),
-            Self::MayMove(_) | Self::OtherTargets => {
+            Self::MayMove(_) | Self::OtherTargets | Self::NotHeld { .. } => {
                 let hint = "`arm.stop()`, or switch off the supply of the servos".to_owned();
                 error::<MayMove>(py, &message, &[hint])
             }
-            Self::StillMoving { .. } | Self::NotReached { .. } | Self::Paused { .. } => {
-                error::<NotReached>(py, &message, &[])
-            }
+            Self::StillMoving { .. }
+            | Self::NotReached { .. }
+            | Self::Paused { .. }
+            | Self::StoppedByAnother => error::<NotReached>(py, &message, &[]),
             Self::StartTooFar(_) => {
                 let hint = "approach=SECONDS goes there smoothly first: look that the way is free".to_owned();
                 error::<TooFar>(py, &message, &[hint])

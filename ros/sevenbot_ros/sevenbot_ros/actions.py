@@ -47,6 +47,7 @@ def home(driver: Driver) -> str:
 
 def _arrive(driver: Driver, arm: sevenbot.Arm) -> None:
     end = driver.now() + LONGEST_MOVE
+    away: list[str] = []
     while driver.now() < end:
         driver.interlock.wait(LOOK)
         status = arm.status()
@@ -56,9 +57,11 @@ def _arrive(driver: Driver, arm: sevenbot.Arm) -> None:
             raise sevenbot.Interrupted("the arm got other targets on its way")
         if status.problems:
             raise sevenbot.NotReached("; ".join(f"{problem}" for problem in status.problems))
-        if all(joint.is_at_target for joint in status.joints):
+        away = [f"{joint.joint}" for joint in status.joints if not joint.is_at_target]
+        if not away:
             return
-    raise sevenbot.NotReached("the arm does not get to the standard pose")
+    joints = ", ".join(away)
+    raise sevenbot.NotReached(f"not at the standard pose after {LONGEST_MOVE:g} s: joints {joints}: call home again")
 
 
 def park(driver: Driver) -> str:

@@ -50,7 +50,7 @@ pub(crate) fn run(session: &mut Session, args: &LogArgs) -> Result<(), CommandEr
         let length = fs::metadata(&args.file).map_err(|error| CommandError::file(&args.file, error))?.len();
         // The log of a line ends silently when its disk is full.
         if length <= written {
-            return Err(CommandError::file(&args.file, "the log cannot be written any more"));
+            return Err(CommandError::file(&args.file, "the log has stopped growing: is the disk full?"));
         }
         written = length;
         interrupt.check()

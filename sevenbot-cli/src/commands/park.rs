@@ -46,7 +46,7 @@ pub(crate) struct ParkArgs {
           value_parser = angle)]
     angles: Option<Vec<Option<FineAngle>>>,
     /// Keep this pose for this arm, once it has parked there.
-    #[arg(long, requires = "angles")]
+    #[arg(long, requires = "angles", conflicts_with = "standard")]
     keep: bool,
     /// The standard park pose, also if another one is kept.
     #[arg(long, conflicts_with = "angles")]

@@ -22,7 +22,7 @@ use crate::input_file;
 use crate::interrupt::hold_on_interrupt;
 use crate::output_file::{ForceArg, OutputFile};
 use crate::plot::{self, JointTrack};
-use crate::printer::Printable;
+use crate::printer::{Printable, warn};
 use crate::session::Session;
 use crate::watch::{ProgressWatch, note_rounding_of};
 
@@ -52,7 +52,7 @@ pub(crate) struct PlayArgs {
     /// A recording of `sevenbot record`, or one written by hand; - is standard input.
     file: PathBuf,
     /// Speed as a factor, 0.1x to 10x.
-    #[arg(long, value_name = "FACTOR", default_value = "1x", value_parser = factor)]
+    #[arg(long, value_name = "FACTOR", default_value = "1x", allow_hyphen_values = true, value_parser = factor)]
     speed: f64,
     /// Repeat without end, or N times in all.
     #[arg(long = "loop", value_name = "N", num_args = 0..=1, require_equals = true,
@@ -111,9 +111,16 @@ pub(super) fn follow(arm: &mut Arm, recording: &Recording) -> Result<(), Command
 }
 
 fn play(player: &mut Player, arm: &mut Arm, times: u32) -> Result<(), CommandError> {
-    hold_on_interrupt(arm, |arm, interrupt| {
+    let played = hold_on_interrupt(arm, |arm, interrupt| {
         Ok(player.play(arm, times, &mut ProgressWatch::new(interrupt))?)
-    })
+    });
+    if player.has_left_pace() {
+        warn(
+            "the speeds and durations of the joints may still be those of the recording, and a speed of 0 is the motors' \
+             maximum: `sevenbot get speed time` shows them, and `sevenbot set` changes them",
+        );
+    }
+    played
 }
 
 /// Reads the recording, and checks that an arm can follow it.

@@ -1,5 +1,6 @@
 //! `ports`: lists the serial ports of this machine, and the arms behind them.
 
+use std::fs;
 use std::io::{self, Write};
 
 use clap::Args;
@@ -9,15 +10,15 @@ use sevenbot::ports::{PortInfo, ProbeResult, probe, reachable};
 
 use crate::command_error::CommandError;
 use crate::printer::Printable;
-use crate::session::Session;
+use crate::session::{Session, running_simulators};
 use crate::style::GOOD;
 
-/// List serial ports and servers, and the arms behind them.
+/// List serial ports, servers and simulators, and the arms behind them.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Opens all ports at the same time and asks each for its device code. Other
-devices receive 14 bytes. Lists the servers of this user, too; an arm that
-`sevenbot serve` holds is found through its server.
+devices receive 14 bytes. Lists the servers and simulators of this user, too; an
+arm that `sevenbot serve` holds is found through its server.
 
 Examples:
   sevenbot ports
@@ -44,13 +45,14 @@ pub(crate) fn run(session: &mut Session, args: &PortsArgs) -> Result<(), Command
         return Ok(network::remember(known)?);
     }
     if let Some(name) = &args.forget {
-        return Ok(network::forget(name)?);
+        return forget(name);
     }
     let named = args.ports.iter().chain(&session.port);
     let named = named.map(|name| PortInfo { name: name.clone(), description: String::new() });
     let mut asked = if args.ports.is_empty() { reachable() } else { Vec::new() };
-    for port in named {
-        if asked.iter().all(|known| known.name != port.name) {
+    let simulators = if args.ports.is_empty() { free_simulators() } else { Vec::new() };
+    for port in named.chain(simulators) {
+        if asked.iter().all(|known| !is_same(&known.name, &port.name)) {
             asked.push(port);
         }
     }
@@ -58,6 +60,25 @@ pub(crate) fn run(session: &mut Session, args: &PortsArgs) -> Result<(), Command
     let ports =
         probe(asked, session.options.baud).into_iter().map(PortLine::from).chain(of_network).collect();
     session.printer.print(&Ports { ports })
+}
+
+fn forget(name: &str) -> Result<(), CommandError> {
+    let was_known = network::known_names().iter().any(|known| known.name == name);
+    network::forget(name)?;
+    let how = "`sevenbot ports --network` lists the names";
+    if was_known { Ok(()) } else { Err(CommandError::Arm(format!("{name} is not a known name: {how}"))) }
+}
+
+/// The simulators of this user that no server holds.
+fn free_simulators() -> Vec<PortInfo> {
+    let free = running_simulators().into_iter().filter(|port| network::serving(port).is_none());
+    free.map(|name| PortInfo { name, description: "simulator".to_owned() }).collect()
+}
+
+/// Do both names lead to the same port? A simulator has a link beside its port.
+fn is_same(one: &str, other: &str) -> bool {
+    one == other
+        || fs::canonicalize(one).is_ok_and(|path| fs::canonicalize(other).is_ok_and(|other| path == other))
 }
 
 /// Parses `NAME=ADDRESS`.

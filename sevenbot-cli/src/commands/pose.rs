@@ -7,16 +7,17 @@ use clap::{ArgAction, Args};
 use serde::Serialize;
 use sevenbot::fine::FineTargets;
 use sevenbot::joints::JointSnapshot;
-use sevenbot::map::{SPEED, TARGET_POSITION, TIME};
-use sevenbot::moves::{JointMove, Pace};
-use sevenbot::{Angle, Arm, FineAngle, Joint, MoveTime, Span, Speed};
+use sevenbot::map::TARGET_POSITION;
+use sevenbot::moves::{JointMove, Pace, PaceBefore};
+use sevenbot::register_text::joints;
+use sevenbot::{Angle, Arm, FineAngle, Joint, MoveTime, Speed};
 
 use crate::command_error::CommandError;
 use crate::guard_args::GuardArgs;
-use crate::interrupt::hold_on_interrupt;
-use crate::printer::Printable;
+use crate::interrupt::{Interrupt, hold_on_interrupt};
+use crate::printer::{Printable, note, warn};
 use crate::session::Session;
-use crate::step_target::step_target;
+use crate::step_target::{out_of_range, step_target};
 use crate::watch::{ProgressWatch, note_rounding};
 
 /// Move joints to a pose.
@@ -38,7 +39,8 @@ If the joints would take the arm below the table or into its own base, on the
 way too, a warning says so: joints go where they are sent. `sevenbot move-to`
 refuses that, and its help describes the guard.
 
-With --wait the speeds and durations of the joints are put back after the move.
+With --wait the speeds and durations of the joints are put back after the move,
+also if it fails: then the command waits until the other joints have stopped.
 Without it they stay as this command sets them, because another speed would act
 at once; `sevenbot get speed` shows them.
 
@@ -72,11 +74,11 @@ pub(crate) struct HomeArgs {
 struct PaceArgs {
     /// Speed of these joints, as the register has it: 1 to 100 steps of 1.9 degrees per second, or 0 for the motors'
     /// maximum. Or in degrees per second, 2deg/s to 190deg/s.
-    #[arg(long, value_name = "STEPS|DEG/S", value_parser = speed)]
+    #[arg(long, value_name = "STEPS|DEG/S", allow_hyphen_values = true, value_parser = speed)]
     speed: Option<Speed>,
     /// Duration of the move, as the register has it: 0 to 100 steps of 100 ms. Or in seconds, 0.1s to 10s. Sets the speeds to
     /// 0, so that it applies.
-    #[arg(long, value_name = "STEPS|S", conflicts_with = "speed", value_parser = time)]
+    #[arg(long, value_name = "STEPS|S", conflicts_with = "speed", allow_hyphen_values = true, value_parser = time)]
     time: Option<MoveTime>,
     /// Wait until the joints have arrived.
     #[arg(long)]
@@ -171,12 +173,7 @@ impl PoseArg {
         step_target(joints, joint, 0)?;
         let hundredths = i32::from(base.hundredths()).saturating_add(step);
         let angle = u16::try_from(hundredths).ok().and_then(FineAngle::from_hundredths);
-        angle.map(Some).ok_or_else(|| {
-            let (number, degrees) = (joint.number(), f64::from(hundredths) / 100.0);
-            CommandError::Arm(format!(
-                "joint {number} would go to {degrees}°: it takes 0 to 180; nothing was moved"
-            ))
-        })
+        angle.map(Some).ok_or_else(|| out_of_range(joint, f64::from(hundredths) / 100.0))
     }
 }
 
@@ -198,24 +195,60 @@ fn move_to(session: &mut Session, goals: &[PoseArg], pace: &PaceArgs) -> Result<
     let reached = hold_on_interrupt(&mut arm, |arm, interrupt| {
         let targets = targets(goals, arm)?;
         pace.guard.warn_of_way(arm, &targets, pace.pace())?;
-        before = pace.is_for_this_move().then(|| arm.read_span(Span::between(&SPEED, &TIME))).transpose()?;
-        pace.pace().set(arm, &targets)?;
+        before = pace.is_for_this_move().then(|| PaceBefore::read(arm, &targets)).transpose()?;
         interrupt.check()?;
-        let begun = JointMove::begin_fine(arm, targets)?;
-        note_rounding(&begun);
-        let reached = pace.wait.then(|| begun.finish(arm, &mut ProgressWatch::new(interrupt))).transpose()?;
-        reached.map(|whole| measured(arm, goals, whole)).transpose()
+        let reached = go(arm, targets, pace, interrupt);
+        if let (Err(error), Some(before)) = (&reached, &before) {
+            wait_for_rest(arm, before, error, interrupt);
+        }
+        reached?.map(|whole| measured(arm, goals, whole)).transpose()
     });
-    // While a joint may still move, another speed would act at once.
-    if let (Ok(_) | Err(CommandError::Interrupted), Some(before)) = (&reached, before) {
-        arm.write_checked(before.address, &before.values)?;
-    }
+    put_back(&mut arm, before, reached.is_err())?;
     match reached? {
         None => Ok(()),
         Some(ReachedPose::Degrees(positions_degrees)) => {
             session.printer.print(&Positions { positions_degrees })
         }
         Some(ReachedPose::Hundredths(positions)) => session.printer.print(&positions),
+    }
+}
+
+/// Starts the move, and with --wait waits for its end. Returns the positions in whole degrees.
+fn go(
+    arm: &mut Arm,
+    targets: FineTargets,
+    pace: &PaceArgs,
+    interrupt: Interrupt,
+) -> Result<Option<[u8; 7]>, CommandError> {
+    let begun = JointMove::begin_at_pace(arm, targets, pace.pace())?;
+    note_rounding(&begun);
+    Ok(pace.wait.then(|| begun.finish(arm, &mut ProgressWatch::new(interrupt))).transpose()?)
+}
+
+/// After a failure: waits until the other joints rest, because another speed would act on them at once. Ctrl-C ends the wait,
+/// and the arm then holds.
+fn wait_for_rest(arm: &mut Arm, before: &PaceBefore, error: &CommandError, interrupt: Interrupt) {
+    if let (Ok(moving @ 1..), Some(error)) = (before.moving(arm), error.message()) {
+        note(format_args!(
+            "{error}. Still moving: {}. This command waits for the end of that, and then puts the speeds back; Ctrl-C stops the arm",
+            joints(moving)
+        ));
+    }
+    // If it fails, the speeds are not put back, for the same reason.
+    let _ = before.wait_for_rest(arm, &mut ProgressWatch::new(interrupt));
+}
+
+/// Puts the speeds and durations back. A failure after that of the move is only a warning.
+fn put_back(arm: &mut Arm, before: Option<PaceBefore>, has_failed: bool) -> Result<(), CommandError> {
+    match before.map_or(Ok(()), |before| before.put_back(arm)) {
+        Err(error) if has_failed => {
+            warn(format_args!(
+                "the speeds and durations of the joints are still those of this command: {error}; `sevenbot get speed time` \
+                 shows them, and `sevenbot set` changes them"
+            ));
+            Ok(())
+        }
+        done => Ok(done?),
     }
 }
 

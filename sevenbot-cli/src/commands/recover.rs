@@ -148,8 +148,8 @@ fn recover(arm: &mut Arm, before: &Health, yes: bool) -> Result<(), CommandError
     arm.hold().map(drop).map_err(|error| MoveError::from(error).into())
 }
 
-/// Makes blocked joints hold where they are, which a new target does (D27). A joint that let go engages where it is by itself (D28),
-/// and the others keep their targets: with its position as its target, a loaded joint would sink a little further.
+/// Writes the measured position of each blocked joint as its target: a new target lets it hold there (D27). A joint that let go
+/// engages by itself (D28). The others keep their targets: a loaded joint would sink a little below its measured position.
 fn free_blocked_joints(arm: &mut Arm, health: &Health) -> Result<(), CommandError> {
     let mut targets = [None; 7];
     for (target, joint) in targets.iter_mut().zip(&health.joints) {

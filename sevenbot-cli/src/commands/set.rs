@@ -40,8 +40,8 @@ written while the joint does not answer or has let go. --raw writes it all the
 same. `motor-state 1` is as `sevenbot state servo`. A motor state without torque
 asks first: the arm may fall.
 
-Exit status 1 when a register did not take its value or the joints do not obey,
-2 when the table does not allow the value."))]
+Exit status 1 when a register did not take its value, a setting is not stored,
+or the joints do not obey; 2 when the table does not allow the value."))]
 pub(crate) struct SetArgs {
     /// Name, number or range of registers.
     #[arg(value_name = "REGISTER", value_parser = RegisterParser(names::parse), hide_possible_values = true)]
@@ -105,7 +105,7 @@ pub(crate) fn run(session: &mut Session, args: &SetArgs) -> Result<(), CommandEr
     written
 }
 
-/// Asks before a write of the motor state lets a driven arm go, as `state` does.
+/// Asks for confirmation, as `state` does, if this write would let a driven arm go.
 fn confirm_release(arm: &mut Arm, span: Span, bytes: &[u8], yes: bool) -> Result<(), CommandError> {
     let wanted = span.addresses().zip(bytes).find(|(address, _)| MOTOR_STATE.holds(*address));
     match wanted {

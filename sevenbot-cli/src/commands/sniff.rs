@@ -61,8 +61,9 @@ fn is_log_file(path: &Path) -> Result<bool, CommandError> {
 /// A log of `--log`, or a recorded session: each direction by itself, with its times.
 fn log(printer: &mut Printer, path: &Path) -> Result<(), CommandError> {
     let text = fs::read_to_string(path).map_err(|error| CommandError::file(path, error))?;
-    let entries = wire_log::entries(&text)
-        .map_err(|line| CommandError::file(path, format!("line {line} is no entry of a log")))?;
+    let entries = wire_log::entries(&text).map_err(|line| {
+        CommandError::file(path, format!("line {line} is no entry of a log: delete it to see the others"))
+    })?;
     let (mut host, mut arm) = (TrafficParser::default(), TrafficParser::default());
     for entry in &entries {
         let parser = if entry.sender == Sender::Host { &mut host } else { &mut arm };

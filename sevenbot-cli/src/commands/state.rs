@@ -2,6 +2,7 @@
 
 use clap::{Args, ValueEnum};
 use sevenbot::map::{MOTOR_STATE, motor_state};
+use sevenbot::moves::MoveError;
 use sevenbot::register_text::{entries, joints};
 use sevenbot::{Arm, Span};
 
@@ -9,7 +10,7 @@ use super::get::RegisterList;
 use crate::command_error::CommandError;
 use crate::confirm::confirm;
 use crate::interrupt::hold_on_interrupt;
-use crate::printer::warn;
+use crate::printer::{note, warn};
 use crate::session::Session;
 
 /// Show or change the motor state.
@@ -21,7 +22,8 @@ Examples:
   sevenbot state forceless --yes  the arm can be moved by hand; it falls unless
                                   held
 
-`state servo` watches for half a second whether the joints hold.
+`state servo` watches for half a second whether the joints hold. While no servo
+answers it writes nothing: the motors stay off when their supply is back.
 
 Exit status 1 if the arm may not have taken the state: it may be moving. Also if
 a joint does not hold in state servo: it does not answer or has let go.")]
@@ -65,11 +67,20 @@ fn change(arm: &mut Arm, wanted: MotorStateArg, yes: bool) -> Result<(), Command
     confirm_state(arm, wanted.code(), yes)?;
     hold_on_interrupt(arm, |arm, _| {
         if let MotorStateArg::Servo = wanted {
-            return Ok(arm.engage_and_watch()?);
+            return engage(arm);
         }
         arm.write_motion(MOTOR_STATE.address, &[wanted.code()])?;
         warn_about_silent_joints(arm)
     })
+}
+
+fn engage(arm: &mut Arm) -> Result<(), CommandError> {
+    let engaged = arm.engage_and_watch();
+    let is_refused = matches!(engaged, Err(MoveError::Problems(_)));
+    if is_refused && arm.joints().is_ok_and(|joints| !joints.is_driven()) {
+        note("the motors were not switched on");
+    }
+    Ok(engaged?)
 }
 
 /// Without an answer it is unknown whether a motor is off.

@@ -1,7 +1,9 @@
 //! `stop`: makes every joint hold its position.
 
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
+use std::fs;
 use std::io::{self, Write};
+use std::path::PathBuf;
 use std::time::Duration;
 
 use serde::Serialize;
@@ -29,7 +31,8 @@ a second.
 Exit status 1 if the arm may not hold: it may still be moving, a joint does not
 answer or has let go, or another program sends it elsewhere. 3 if it received no
 stop, because the port cannot be opened or no arm answers. With --all, that of
-the first arm that may not hold.")]
+the first arm that may not hold; of the ports that cannot be opened, only a
+server, a simulator and the one of --port count as an arm.")]
 pub(crate) struct StopArgs {
     /// Stop every arm of this computer: behind servers of this user, serial ports, and simulators.
     #[arg(long, conflicts_with = "log")]
@@ -76,38 +79,38 @@ type Outcome = (Result<JointSnapshot, CommandError>, String);
 /// Stops all arms at the same time. The ports that a server holds are stopped through the server.
 fn stop_all(session: &mut Session) -> Result<(), CommandError> {
     let served: Vec<_> = network::servers().iter().map(network::LocalServer::address).collect();
+    let simulators = running_simulators();
+    // Another port need not lead to an arm.
+    let is_arm = |port: &String| served.iter().chain(&simulators).chain(&session.port).any(|arm| arm == port);
     let mut failed: Option<CommandError> = None;
-    let mut has_stopped = false;
-    for (held, port) in stop_each(session, &served) {
+    let (mut has_stopped, mut tried) = (false, Vec::new());
+    for (held, port) in stop_each(session, &served, &simulators) {
         match held {
             Ok(joints) => {
                 warn_about_unheld_joints(&joints);
                 session.printer.print(&Stopped { port, positions_degrees: positions(&joints) })?;
                 has_stopped = true;
             }
-            // A port without an arm, or one that another program uses, need not be an arm.
-            Err(CommandError::Open { error, .. }) if !served.contains(&port) => {
-                warn(format_args!("{port}: {error}"));
-            }
+            Err(CommandError::Open { error, .. }) if !is_arm(&port) => tried.push((port, error)),
             Err(error) => {
                 warn(format_args!("{port}: {NO_STOP}"));
                 failed.get_or_insert(error);
             }
         }
     }
-    match failed {
-        Some(error) => Err(error),
-        None if has_stopped => Ok(()),
-        None => Err(CommandError::NoArm { tried: Vec::new() }),
+    if failed.is_none() && !has_stopped {
+        return Err(CommandError::NoArm { tried });
     }
+    tried.iter().for_each(|(port, error)| warn(format_args!("{port}: {error}")));
+    failed.map_or(Ok(()), Err)
 }
 
 /// Stops each arm in a thread of its own, and waits for all: no arm goes on because the outcome of another cannot be printed.
-fn stop_each(session: &Session, served: &[String]) -> Vec<Outcome> {
+fn stop_each(session: &Session, served: &[String], simulators: &[String]) -> Vec<Outcome> {
     let listed = ports::available().into_iter().map(|port| port.name);
     let free = |port: &String| network::serving(port).is_none();
-    let free = listed.chain(running_simulators()).chain(session.port.clone()).filter(free);
-    let names: BTreeSet<String> = served.iter().cloned().chain(free).collect();
+    let free = listed.chain(simulators.iter().cloned()).chain(session.port.clone()).filter(free);
+    let ports: BTreeMap<_, _> = served.iter().cloned().chain(free).map(by_path).collect();
     let options =
         ArmOptions { reply_timeout: session.options.reply_timeout.min(PATIENCE), ..session.options };
     let stop = |name: String| {
@@ -117,6 +120,11 @@ fn stop_each(session: &Session, served: &[String]) -> Vec<Outcome> {
             (held.and_then(|mut arm| hold(&mut arm)), name)
         })
     };
-    let threads: Vec<_> = names.into_iter().map(stop).collect();
+    let threads: Vec<_> = ports.into_values().map(stop).collect();
     threads.into_iter().filter_map(|thread| thread.join().ok()).collect()
+}
+
+/// A port with the path behind its links. Two threads that open one port under two names would keep each other from the arm.
+fn by_path(port: String) -> (PathBuf, String) {
+    (fs::canonicalize(&port).unwrap_or_else(|_| PathBuf::from(&port)), port)
 }

@@ -55,7 +55,7 @@ pub(super) enum Answer {
 pub(super) fn accept<B>(request: &Request<B>, protocol: Protocol) -> Result<Answer, Refusal> {
     create_response_with_body(request, Full::default)
         .map(|response| Answer::Upgrade(response, protocol))
-        .map_err(|_| (StatusCode::BAD_REQUEST, "Here is a WebSocket.\n"))
+        .map_err(|_| (StatusCode::BAD_REQUEST, "This address takes WebSocket connections only.\n"))
 }
 
 /// The name by which the browser knows this server. It has to be an address of this computer.

@@ -81,7 +81,8 @@ impl ClassSite {
         check_origin(request, host, self.is_encrypted)?;
         let given = token_of(request.uri()).unwrap_or_default();
         let lease = self.class.lease_with(|key| is_equal(given.as_bytes(), key.as_bytes()));
-        let lease = lease.ok_or((StatusCode::FORBIDDEN, "Another pupil has the arm, or nobody.\n"))?;
+        let refusal = "You do not have the real arm now: the teacher gives it.\n";
+        let lease = lease.ok_or((StatusCode::FORBIDDEN, refusal))?;
         accept(request, Protocol::LentArm(lease))
     }
 }

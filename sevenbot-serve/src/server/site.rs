@@ -119,7 +119,8 @@ impl PageSite {
             return Err((StatusCode::UNAUTHORIZED, "Token: connect to /frames?token=TOKEN.\n"));
         }
         if !self.has_arm {
-            return Err((StatusCode::SERVICE_UNAVAILABLE, "No arm was found at the start.\n"));
+            let text = "No arm was found at the start. Connect the arm, and start `sevenbot view` again.\n";
+            return Err((StatusCode::SERVICE_UNAVAILABLE, text));
         }
         accept(request, Protocol::Frames)
     }

@@ -38,8 +38,14 @@ pub enum StartError {
         cause: io::Error,
     },
     /// The certificate or its key cannot be used.
-    #[error("{}: {cause}", path.display())]
+    #[error(
+        "{option} {}: {cause}: use a certificate (BEGIN CERTIFICATE) and its private key (BEGIN PRIVATE KEY) in PEM; \
+         docs/serve.md shows how to make them",
+        path.display()
+    )]
     Certificate {
+        /// The option with the name of the file.
+        option: &'static str,
         /// The file.
         path: PathBuf,
         /// The reason.

@@ -22,15 +22,17 @@ pub struct TlsFiles {
 
 /// Reads the files.
 pub(super) fn acceptor(files: &TlsFiles) -> Result<TlsAcceptor, StartError> {
-    let failed = |path: &Path, cause: io::Error| StartError::Certificate { path: path.to_owned(), cause };
+    let failed =
+        |option, path: &Path, cause| StartError::Certificate { option, path: path.to_owned(), cause };
+    let failed_certificate = |cause| failed("--tls-cert", &files.certificate, cause);
     let chain = CertificateDer::pem_file_iter(&files.certificate)
         .and_then(Iterator::collect::<Result<Vec<_>, _>>)
-        .map_err(|error| failed(&files.certificate, io::Error::other(error.to_string())))?;
+        .map_err(|error| failed_certificate(io::Error::other(error.to_string())))?;
     let key = PrivateKeyDer::from_pem_file(&files.key)
-        .map_err(|error| failed(&files.key, io::Error::other(error.to_string())))?;
+        .map_err(|error| failed("--tls-key", &files.key, io::Error::other(error.to_string())))?;
     let config = ServerConfig::builder()
         .with_no_client_auth()
         .with_single_cert(chain, key)
-        .map_err(|error| failed(&files.certificate, io::Error::other(error)))?;
+        .map_err(|error| failed_certificate(io::Error::other(error)))?;
     Ok(TlsAcceptor::from(Arc::new(config)))
 }

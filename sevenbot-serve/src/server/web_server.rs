@@ -160,7 +160,8 @@ impl WebServer {
         };
         let Some(place) = place else {
             self.refused(peer, RefusalReason::Full);
-            return refusal(StatusCode::SERVICE_UNAVAILABLE, "The server has too many clients.\n");
+            let text = "The server has too many clients. Close a page or a program, and try again.\n";
+            return refusal(StatusCode::SERVICE_UNAVAILABLE, text);
         };
         let connection = hyper::upgrade::on(&mut request);
         *lock(upgrade) = Some(Upgrade { connection, protocol, place, since });

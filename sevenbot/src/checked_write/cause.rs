@@ -10,7 +10,7 @@ use protocol_core::registers::{Access, Region, Register};
 use crate::map_view::MapView;
 use crate::names::name_of_register;
 use crate::register_text;
-use crate::status_block::{StatusBlock, has_restarted};
+use crate::status_block::StatusBlock;
 
 /// Why a register does not hold what was written to it.
 ///
@@ -54,6 +54,9 @@ pub enum MismatchCause {
     OutOfReach,
     /// The settings storage is full until the next restart ([D19](protocol_core::decisions#d19)).
     StorageFull,
+    /// The register holds the value, but its setting is not stored: the settings storage has a fault
+    /// ([D19](protocol_core::decisions#d19)).
+    NotStored,
     /// The controller restarted since the write, and has its defaults.
     Restarted,
     /// The arm received the frame damaged.
@@ -121,7 +124,7 @@ pub(super) fn cause_from_access(address: u8, locked: bool) -> Option<MismatchCau
 pub(crate) fn cause_from_counters(before: &StatusBlock, after: &StatusBlock) -> MismatchCause {
     let refused = before.frames_refused() != after.frames_refused();
     match after.last_refusal() {
-        _ if has_restarted(before.frames_accepted(), after.frames_accepted()) => MismatchCause::Restarted,
+        _ if after.has_restarted_since(before) => MismatchCause::Restarted,
         Some((refusal::OUT_OF_RANGE, address)) if refused => MismatchCause::OutOfRange { address },
         Some((refusal::STORAGE_FULL, _)) if refused => MismatchCause::StorageFull,
         Some((refusal::HALF_A_WORD, address)) if refused => MismatchCause::HalfOfWord { address },
@@ -168,6 +171,9 @@ impl fmt::Display for MismatchCause {
             }
             Self::OutOfReach => out.write_str("no joint angles reach the position"),
             Self::StorageFull => out.write_str("the settings storage is full until the arm restarts"),
+            Self::NotStored => {
+                out.write_str("the settings storage has a fault; switch the arm off and on, then write it again")
+            }
             Self::Restarted => out.write_str("the controller restarted, and has the values of its start"),
             Self::Damaged => out.write_str("the arm received the request damaged; try again"),
             Self::NotPassedOn(reason) => reason.fmt(out),

@@ -14,6 +14,7 @@ use super::Problem;
 use super::problem::sentences;
 use super::watch::{MoveFault, MoveWatch, REGISTERS, SILENCE, STATE_REGISTERS};
 use crate::arm::Arm;
+use crate::checked_write::ServerReason;
 use crate::error::Error;
 use host_link::Snapshot;
 
@@ -29,6 +30,9 @@ pub enum MoveCheckError {
         /// The value of register 29.
         state: u8,
     },
+    /// Another program stopped the arm through the server that both use, or ended the stream of this one.
+    #[error("{}", ServerReason::Stopped)]
+    StoppedByAnother,
     /// An exchange with the arm failed.
     #[error(transparent)]
     Exchange(#[from] Error),
@@ -159,6 +163,7 @@ fn told(arm: &mut Arm, fault: MoveFault) -> MoveCheckError {
     match fault {
         MoveFault::Problems(problems) => MoveCheckError::Problems(problems),
         MoveFault::NotDriven { state } => MoveCheckError::NotDriven { state },
+        MoveFault::StoppedByAnother => MoveCheckError::StoppedByAnother,
         MoveFault::Silent => MoveCheckError::Exchange(arm.no_background_answer(REGISTERS, SILENCE)),
     }
 }

@@ -37,7 +37,7 @@ pub struct JointHealth {
     /// Does an obstacle keep the joint from its target ([D27](protocol_core::decisions#d27))? Not of a gripper that
     /// holds something.
     pub is_blocked: Option<bool>,
-    /// Does the joint, a gripper, hold something? It was stopped by it, and still presses it with at least half of the grip limit.
+    /// Does the gripper hold something? Something stopped it, and its load is at least half of the grip limit.
     pub is_gripping: Option<bool>,
     /// Does the servo hold no torque although it should ([D28](protocol_core::decisions#d28))?
     pub has_let_go: Option<bool>,

@@ -18,6 +18,7 @@ use protocol_core::registers::map::{
 use super::told::GRIPPER;
 use super::{ALL_JOINTS, Problem, ProblemFlags, ProblemKind};
 use crate::status_block::has_restarted;
+use host_link::sharing::SharingState;
 use host_link::{Snapshot, Span};
 
 /// The registers of a check: set-point period, protection block, status block.
@@ -30,6 +31,8 @@ const POLL_PERIOD: Duration = Duration::from_millis(100);
 const SHARE_OF_LINE: u32 = 10;
 /// Bits of a question and its answer on the line: 7 bytes each around the values, ten bits a byte.
 const BITS_PER_CHECK: u32 = 10 * (7 + 7 + REGISTERS.count() as u32);
+/// Bits of the shortest frame on the line: seven bytes of ten bits.
+const BITS_OF_FRAME: u128 = 70;
 /// An arm that answers none of the last questions for this time is gone.
 pub(super) const SILENCE: Duration = Duration::from_millis(1_500);
 /// So many questions at least.
@@ -49,6 +52,8 @@ pub enum MoveFault {
     },
     /// The arm has not answered for 1.5 s.
     Silent,
+    /// Another program stopped the arm through the server that both use, or ended the stream of this one.
+    StoppedByAnother,
 }
 
 /// Watches over the driven joints of one move.
@@ -77,11 +82,14 @@ pub struct MoveWatch {
     /// Is the effector a gripper? Then an obstacle of joint 7 is what it holds.
     is_gripper: bool,
     begun: Duration,
-    /// The arm's counter of frames at the last answer.
-    accepted: Option<u16>,
+    baud: u32,
+    /// The arm's counter of frames in the last answer that had it, and a time before that reading: an answer may be taken late.
+    accepted: Option<(Duration, u16)>,
     /// The period that the arm has to have while a stream is open.
     period_ms: Option<u16>,
     last_answer: Duration,
+    /// The time of the answer before the last one. The question for the last one was asked later.
+    answer_before: Duration,
     unanswered: u32,
     question_period: Duration,
     next_question: Duration,
@@ -100,9 +108,11 @@ impl MoveWatch {
             blocked_before: u8::MAX,
             is_gripper: true,
             begun: now,
+            baud,
             accepted: None,
             period_ms: None,
             last_answer: now,
+            answer_before: now,
             unanswered: 0,
             question_period,
             next_question: now + question_period,
@@ -167,7 +177,7 @@ impl MoveWatch {
     /// # Errors
     /// They tell that the move has ended.
     pub fn registers(&mut self, now: Duration, registers: &Snapshot) -> Result<(), MoveFault> {
-        (self.last_answer, self.unanswered) = (now, 0);
+        (self.answer_before, self.last_answer, self.unanswered) = (self.last_answer, now, 0);
         let has_state = registers.holds(STATE_REGISTERS);
         if has_state {
             self.is_gripper = registers.byte(&EFFECTOR_TYPE) == GRIPPER;
@@ -177,6 +187,9 @@ impl MoveWatch {
             let problems = self.problems(registers, now);
             if !problems.is_empty() {
                 return Err(MoveFault::Problems(problems));
+            }
+            if self.needs_motors && self.is_stopped_by_another(registers) {
+                return Err(MoveFault::StoppedByAnother);
             }
         }
         let state = registers.byte(&MOTOR_STATE);
@@ -198,21 +211,40 @@ impl MoveWatch {
     }
 
     /// Has the controller restarted since the last answer? Then its counter of frames begins again, and its stream is off.
+    /// Behind a server another program may have switched the stream off, so only the counter tells.
     fn has_restarted(&mut self, registers: &Snapshot) -> bool {
         if registers.byte(&STATUS_VERSION) == 0 {
             return false;
         }
         let accepted = registers.counter(&FRAMES_ACCEPTED);
-        let before = self.accepted.replace(accepted).unwrap_or(accepted);
-        let has_other_period =
-            self.period_ms.is_some_and(|period| registers.word(SET_POINT_PERIOD.address) != period);
-        has_other_period || has_restarted(before, accepted)
+        let newest = (self.answer_before, accepted);
+        let (since, before) = self.accepted.replace(newest).unwrap_or(newest);
+        let is_shared = SharingState::of(registers).is_some();
+        (self.has_other_period(registers) && !is_shared)
+            || has_restarted(before, accepted, self.frames_since(since))
+    }
+
+    /// The number of the shortest frames that the line can have carried since this time.
+    fn frames_since(&self, time: Duration) -> u32 {
+        let bits = self.last_answer.saturating_sub(time).as_millis() * u128::from(self.baud) / 1_000;
+        u32::try_from(bits / BITS_OF_FRAME).unwrap_or(u32::MAX)
+    }
+
+    /// A stop switches the period off for a moment, before the server knows that it is one.
+    fn is_stopped_by_another(&self, registers: &Snapshot) -> bool {
+        SharingState::of(registers)
+            .is_some_and(|server| server.is_stopped || self.has_other_period(registers))
+    }
+
+    fn has_other_period(&self, registers: &Snapshot) -> bool {
+        self.period_ms.is_some_and(|period| registers.word(SET_POINT_PERIOD.address) != period)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use host_link::sharing::FIRST;
     use protocol_core::registers::map::{MISSING_SERVOS, PROTECTION_VERSION};
 
     const fn ms(milliseconds: u64) -> Duration {
@@ -253,6 +285,44 @@ mod tests {
         let mut other_period = registers(4);
         other_period.values[usize::from(SET_POINT_PERIOD.address)] = 0;
         assert_eq!(watch.registers(ms(30), &other_period), Err(restarted));
+    }
+
+    #[test]
+    fn a_stop_of_another_program_is_no_restart() {
+        let stopped = Err(MoveFault::StoppedByAnother);
+        let shared = |frames, flags, period| {
+            let mut all = registers(frames);
+            let server = Snapshot { address: FIRST, values: vec![1, 2, 0, 1, flags, 0, 0, 0] };
+            all.put(&server);
+            all.values[usize::from(SET_POINT_PERIOD.address)] = period;
+            all
+        };
+        let watch = MoveWatch::new(ms(0), 1, 115_200).with_period(20);
+        assert_eq!(watch.clone().registers(ms(10), &shared(1, 0, 20)), Ok(()));
+        assert_eq!(watch.clone().registers(ms(10), &shared(1, 1, 20)), stopped);
+        assert_eq!(watch.clone().registers(ms(10), &shared(1, 0, 0)), stopped, "the stop has just begun");
+        let mut restarted = watch;
+        assert_eq!(restarted.registers(ms(10), &shared(200, 0, 20)), Ok(()));
+        assert!(matches!(restarted.registers(ms(20), &shared(3, 0, 0)), Err(MoveFault::Problems(_))));
+        let mut move_of_joints = MoveWatch::new(ms(0), 1, 115_200);
+        assert_eq!(move_of_joints.registers(ms(10), &shared(1, 1, 0)), stopped);
+        let mut recording = MoveWatch::new(ms(0), 0, 115_200).of_positions();
+        assert_eq!(recording.registers(ms(10), &shared(1, 1, 0)), Ok(()));
+    }
+
+    #[test]
+    fn many_frames_between_two_answers_are_no_restart() {
+        let frames = |count: u16| {
+            let mut all = registers(0);
+            all.values[usize::from(FRAMES_ACCEPTED.address)..][..2].copy_from_slice(&count.to_le_bytes());
+            all
+        };
+        let mut watch = MoveWatch::new(ms(0), 1, 115_200);
+        assert_eq!(watch.registers(ms(10), &frames(0)), Ok(()));
+        assert_eq!(watch.registers(ms(60_000), &frames(33_000)), Ok(()), "the line can carry 98,000");
+        // This answer may have come long before it was taken.
+        assert_eq!(watch.registers(ms(60_100), &frames(50_000)), Ok(()));
+        assert!(watch.registers(ms(60_200), &frames(50)).is_err(), "15,586 frames in 0.2 s");
     }
 
     #[test]

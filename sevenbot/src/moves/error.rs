@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use crate::approach::StartTooFar;
 use crate::arm::Arm;
-use crate::checked_write::{NotTaken, WriteError};
+use crate::checked_write::{NotTaken, ServerReason, WriteError};
 use crate::error::Error;
 use crate::health::{MoveCheckError, Problem, sentences};
 use crate::hold::HoldError;
@@ -69,6 +69,15 @@ pub enum MoveError {
     /// The arm was told to hold, and has other targets since.
     #[error("the arm does not hold: another program has sent it elsewhere")]
     OtherTargets,
+    /// The arm was told to hold, and something drags joints away from their targets.
+    #[error("the arm does not hold: {}", away_text(away))]
+    NotHeld {
+        /// Joint, position and target in degrees.
+        away: Vec<(Joint, u8, u8)>,
+    },
+    /// Another program stopped the arm through the server that both use, or ended the stream of this one.
+    #[error("{}", ServerReason::Stopped)]
+    StoppedByAnother,
     /// The arm answers, but its reports have ended.
     #[error("the arm has stopped reporting its positions: was it switched off and on?")]
     ReportsStopped,
@@ -98,6 +107,7 @@ impl From<MoveCheckError> for MoveError {
         match error {
             MoveCheckError::Problems(problems) => Self::Problems(problems),
             MoveCheckError::NotDriven { state } => Self::NotDriven { state },
+            MoveCheckError::StoppedByAnother => Self::StoppedByAnother,
             MoveCheckError::Exchange(error) => Self::Exchange(error),
         }
     }

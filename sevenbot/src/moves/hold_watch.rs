@@ -19,6 +19,9 @@ use crate::joints::JointSnapshot;
 /// The arm notices a servo that let go after at most 200 ms (D28), and a silent one sooner.
 const WATCH_TIME: Duration = Duration::from_millis(500);
 const POLL_PERIOD: Duration = Duration::from_millis(50);
+/// A joint that is further from its target, and goes away from it, does not hold. A loaded joint droops by up to 1.5 degrees, and one
+/// that was stopped at speed comes back to its target.
+const HELD_DEGREES: u8 = 10;
 
 impl Arm {
     /// As [`Arm::hold`], and then [`Arm::watch_hold`] if the motors drive the joints.
@@ -41,12 +44,15 @@ impl Arm {
     /// ```
     ///
     /// # Errors
-    /// [`MoveError::MayMove`] if the arm did not take the targets that hold it. Those of [`Arm::watch_hold`], also if the controller
-    /// restarted: it then holds the arm.
+    /// [`MoveError::MayMove`] if the arm did not take the targets that hold it, or does not answer any more. Those of
+    /// [`Arm::watch_hold`], also if the controller restarted: it then holds the arm.
     pub fn hold_and_watch(&mut self) -> Result<JointSnapshot, MoveError> {
         let (joints, has_restarted) = self.hold_through_restarts()?;
         if joints.is_driven() {
-            self.watch_hold()?;
+            self.watch_hold().map_err(|error| match error {
+                MoveError::Exchange(error) => MoveError::MayMove(error.into()),
+                other => other,
+            })?;
         }
         if has_restarted {
             return Err(restarted());
@@ -57,9 +63,10 @@ impl Arm {
     /// Makes the motors drive the joints where they are (motor state 1), and then [`Arm::watch_hold`].
     ///
     /// # Errors
-    /// As [`Arm::write_motion`] and [`Arm::watch_hold`].
+    /// No servo answers: then nothing is written. Those of [`Arm::write_motion`] and [`Arm::watch_hold`].
     pub fn engage_and_watch(&mut self) -> Result<(), MoveError> {
         let before = self.joints()?;
+        self.some_servo_answers()?;
         self.write_motion(MOTOR_STATE.address, &[motor_state::SERVO])?;
         if self.joints()?.has_restarted_since(&before) {
             return Err(restarted());
@@ -67,22 +74,31 @@ impl Arm {
         self.watch_hold()
     }
 
+    /// Fails if no servo answers. In motor state 1 the motors would go on as soon as somebody switches their supply on.
+    pub(super) fn some_servo_answers(&mut self) -> Result<(), MoveError> {
+        self.has_none(|kind| kind == ProblemKind::NoServoAnswers)
+    }
+
     /// Watches for half a second whether all joints hold their targets.
     ///
     /// # Errors
     /// The motors do not drive the joints, a joint is silent, blocked or let go, a servo has an alarm, the supply was lost, the controller restarted,
-    /// another program wrote a target, or an exchange failed.
+    /// another program wrote a target, or an exchange failed. [`MoveError::NotHeld`] if a joint is further than 10 degrees from its
+    /// target at the end, and further than at the start.
     pub fn watch_hold(&mut self) -> Result<(), MoveError> {
         let all = Joint::ALL.into_iter().fold(0, |bits, joint| bits | joint.bit());
         let mut check = MoveCheck::begin(self, all)?;
-        let held = self.joints()?.targets();
+        let begun = self.joints()?;
         let end = self.now() + WATCH_TIME;
         loop {
+            let joints = self.joints()?;
+            // After the joints: a restart, too, gives the arm other targets.
             check.check(self)?;
-            if self.joints()?.targets() != held {
+            if joints.targets() != begun.targets() {
                 return Err(MoveError::OtherTargets);
             }
             if self.now() >= end {
+                check_held(&begun, &joints)?;
                 return self.no_alarm();
             }
             self.sleep(POLL_PERIOD);
@@ -91,12 +107,69 @@ impl Arm {
 
     /// Fails if a servo has an alarm: it may have switched itself off.
     fn no_alarm(&mut self) -> Result<(), MoveError> {
+        self.has_none(ProblemKind::is_alarm)
+    }
+
+    /// Fails if the arm has a problem of such a kind.
+    fn has_none(&mut self, is_such: fn(ProblemKind) -> bool) -> Result<(), MoveError> {
         let mut problems = self.health()?.problems();
-        problems.retain(|problem| problem.kind.is_alarm());
+        problems.retain(|problem| is_such(problem.kind));
         if problems.is_empty() { Ok(()) } else { Err(MoveError::Problems(problems)) }
     }
 }
 
+/// Fails if something drags joints away from their targets.
+fn check_held(begun: &JointSnapshot, now: &JointSnapshot) -> Result<(), MoveError> {
+    let distance = |joints: &JointSnapshot, joint| joints.present(joint).abs_diff(joints.target(joint));
+    let away = Joint::ALL
+        .into_iter()
+        .filter(|joint| distance(now, *joint) > distance(begun, *joint).max(HELD_DEGREES));
+    let away: Vec<_> = away.map(|joint| (joint, now.present(joint), now.target(joint))).collect();
+    if away.is_empty() { Ok(()) } else { Err(MoveError::NotHeld { away }) }
+}
+
 fn restarted() -> MoveError {
     MoveError::Problems(vec![Problem::of_arm(ProblemKind::Restarted)])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulated::{self, SimulationConfig};
+
+    #[test]
+    fn without_supply_nothing_is_written_so_that_the_motors_stay_off_when_it_comes_back() {
+        let (mut arm, simulation) = simulated::arm(SimulationConfig::default()).expect("an arm");
+        arm.driven_joints().expect("it is driven");
+        arm.write_motion(MOTOR_STATE.address, &[motor_state::DAMPING]).expect("a write");
+        simulation.with(|arm| arm.set_fault("supply=off".parse().expect("a fault"), None));
+        arm.sleep(Duration::from_secs(2));
+        let none = Err(MoveError::Problems(vec![Problem::of_arm(ProblemKind::NoServoAnswers)]));
+        assert_eq!(arm.engage_and_watch(), none);
+        // With the effector, register 30, in the same frame.
+        assert_eq!(arm.set_registers(MOTOR_STATE.address, &[motor_state::SERVO, 0], false), none);
+        simulation.with(|arm| drop(arm.end_faults(None)));
+        arm.sleep(Duration::from_secs(2));
+        assert_eq!(arm.joints().map(|joints| joints.motor_state()), Ok(motor_state::DAMPING));
+        assert_eq!(arm.engage_and_watch(), Ok(()));
+    }
+
+    #[test]
+    fn a_joint_that_is_dragged_away_does_not_hold() -> Result<(), Box<dyn std::error::Error>> {
+        let (hold, engage) = (|arm: &mut Arm| arm.hold_and_watch().map(drop), Arm::engage_and_watch);
+        for (push, holds) in [("2=push=-300", true), ("2=push=-3000", false)] {
+            for watch in [hold as fn(&mut Arm) -> Result<(), MoveError>, engage] {
+                let (mut arm, simulation) = simulated::arm(SimulationConfig::default())?;
+                arm.driven_joints()?;
+                let fault = push.parse()?;
+                simulation.with(|arm| arm.set_fault(fault, None));
+                arm.sleep(Duration::from_millis(200));
+                let held = watch(&mut arm);
+                let text = held.as_ref().err().map(ToString::to_string).unwrap_or_default();
+                assert_eq!(held.is_ok(), holds, "{push}: {text}");
+                assert!(holds || text.starts_with("the arm does not hold: joint 2 is at 0°, not "), "{text}");
+            }
+        }
+        Ok(())
+    }
 }

@@ -8,8 +8,9 @@ use std::time::{Duration, Instant};
 use protocol_core::registers::Joint;
 use protocol_core::registers::map::{PRESENT_POSITION, SPEED, TARGET_POSITION, TIME};
 
-use super::error::MoveError;
+use super::error::{ConnectionLost, MoveError};
 use super::observer::{Observer, Stage};
+use super::pace::{Pace, PaceBefore};
 use crate::arm::Arm;
 use crate::error::Error;
 use crate::fine_state::FineTargets;
@@ -113,6 +114,26 @@ impl JointMove {
         let plan = arm.read_span(Span::between(&SPEED, &PRESENT_POSITION))?;
         arm.set_fine_targets_checked(&targets).map_err(MoveError::of_motion)?;
         Self::sent(arm, whole, 0, plan, check)
+    }
+
+    /// As [`Self::begin_fine`], at this pace. If the arm does not take the move, the speeds and durations stay as they were.
+    ///
+    /// # Errors
+    /// As [`JointMove::begin`], and those of [`Pace::set`].
+    pub fn begin_at_pace(arm: &mut Arm, targets: FineTargets, pace: Pace) -> Result<Self, MoveError> {
+        if pace == Pace::default() {
+            return Self::begin_fine(arm, targets);
+        }
+        MoveCheck::begin(arm, joints_of(&targets))?;
+        let before = PaceBefore::read(arm, &targets)?;
+        let begun = pace.set(arm, &targets).and_then(|()| Self::begin_fine(arm, targets));
+        // If this fails too, it is for the same reason. After a bad exchange the arm may have taken the targets.
+        let _ = match &begun {
+            Ok(_) => Ok(()),
+            Err(error) if error.is_connection_lost() => before.put_back(arm),
+            Err(_) => before.put_back_at_once(arm),
+        };
+        begun
     }
 
     /// A move whose targets were sent. A controller that restarted meanwhile has other speeds, so the arm is made to hold.
@@ -284,7 +305,7 @@ impl JointMove {
 }
 
 /// The joints with a target, as [`Joint::bit`]s.
-fn joints_of(targets: &Targets) -> u8 {
+fn joints_of<T>(targets: &[Option<T>; 7]) -> u8 {
     let joints = Joint::ALL.into_iter().zip(targets).filter(|(_, goal)| goal.is_some());
     bits(joints.map(|(joint, _)| joint))
 }
@@ -305,4 +326,35 @@ fn pause(arm: &mut Arm, observer: &mut dyn Observer) -> Result<(), MoveError> {
 
 fn positions(arm: &mut Arm) -> Result<[u8; 7], Error> {
     Ok(arm.read_span(Span::of(&PRESENT_POSITION))?.joints(&PRESENT_POSITION))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fine_angle::FineAngle;
+    use crate::simulated::{self, SimulationConfig};
+    use protocol_core::registers::map::{LIMITS, limit};
+
+    #[test]
+    fn a_move_that_is_refused_leaves_the_speeds_and_durations() {
+        let (mut arm, simulation) = simulated::arm(SimulationConfig::default()).expect("an arm");
+        arm.driven_joints().expect("it is driven");
+        arm.write_all_checked(&[(SPEED.address, vec![30; 7]), (LIMITS.address, vec![limit::LINKAGE])])
+            .expect("taken");
+        let base = [FineAngle::from_degrees(100.0), None, None, None, None, None, None];
+        // Against the limit of the linkage.
+        let folded =
+            [None, FineAngle::from_degrees(0.0), FineAngle::from_degrees(0.0), None, None, None, None];
+        let in_half_a_second = Pace { speed: None, time: MoveTime::from_steps(5) };
+        let refused = |arm: &mut Arm, targets| {
+            let error = JointMove::begin_at_pace(arm, targets, in_half_a_second).expect_err("refused");
+            let pace = arm.read(SPEED.address, 14).expect("an answer");
+            assert_eq!(pace, [[30; 7], [0; 7]].concat(), "{error}");
+            error
+        };
+        assert!(matches!(refused(&mut arm, folded), MoveError::NotTaken(_)));
+        simulation.with(|arm| arm.set_fault("1=missing".parse().expect("a fault"), None));
+        arm.sleep(Duration::from_secs(1));
+        assert!(matches!(refused(&mut arm, base), MoveError::Problems(_)));
+    }
 }

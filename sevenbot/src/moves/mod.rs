@@ -26,7 +26,7 @@ mod tip_move;
 pub use error::{ConnectionLost, MoveError};
 pub use joint_move::{JointMove, Targets};
 pub use observer::{Observer, Stage};
-pub use pace::Pace;
+pub use pace::{Pace, PaceBefore};
 pub use park::{PARK_POSE, ParkError, park_way};
 pub use player::Player;
 pub use recorder::{RecordedPose, Recorder};

@@ -1,11 +1,24 @@
-//! How fast a move is.
+//! How fast a move is, and how fast the joints were before it.
+
+use std::time::Duration;
 
 use super::error::MoveError;
+use super::observer::Observer;
 use crate::arm::Arm;
+use crate::error::Error;
 use crate::fine_state::FineTargets;
 use crate::joints::frames_for;
 use crate::units::{MoveTime, Speed};
-use protocol_core::registers::map::{SPEED, TIME};
+use host_link::{Snapshot, Span};
+use protocol_core::registers::Joint;
+use protocol_core::registers::map::{BLOCKED_JOINTS, MISSING_SERVOS, MOVING_JOINTS, SPEED, TIME};
+
+/// Time between two reads of an arm that comes to rest.
+const POLL_PERIOD: Duration = Duration::from_millis(50);
+/// No move takes longer: 180 degrees at 1.9 degrees/s.
+const LONGEST_MOVE: Duration = Duration::from_secs(100);
+/// Attempts of a read: on a line that loses 3 % of its bytes, about two of three succeed.
+const ATTEMPTS: u32 = 5;
 
 /// How fast a move is: a speed, a duration, or what the arm has.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -31,5 +44,104 @@ impl Pace {
             return Ok(());
         }
         Ok(arm.write_all_checked(&frames)?)
+    }
+}
+
+/// The speeds and durations of the joints before a move, to be put back after it.
+#[derive(Clone, Debug)]
+pub struct PaceBefore {
+    registers: Snapshot,
+    /// The joints of the move, as [`Joint::bit`]s.
+    joints: u8,
+}
+
+impl PaceBefore {
+    /// Reads them before a move to these targets.
+    ///
+    /// # Errors
+    /// As [`Arm::read`].
+    pub fn read(arm: &mut Arm, targets: &FineTargets) -> Result<Self, Error> {
+        let registers = arm.read_span(Span::between(&SPEED, &TIME))?;
+        let joints = Joint::ALL.into_iter().zip(targets).filter(|(_, target)| target.is_some());
+        Ok(Self { registers, joints: joints.fold(0, |bits, (joint, _)| bits | joint.bit()) })
+    }
+
+    /// The joints of the move whose set-point still moves, as [`Joint::bit`]s. None from firmware that does not tell it, and no
+    /// joint that is blocked or silent.
+    ///
+    /// # Errors
+    /// As [`Arm::read`].
+    pub fn moving(&self, arm: &mut Arm) -> Result<u8, Error> {
+        if !arm.identity().has_status_block() {
+            return Ok(0);
+        }
+        arm.with_attempts(ATTEMPTS, |arm| {
+            // A bad line loses a long answer, so these are two.
+            let blocked = arm.read_span(Span::of(&BLOCKED_JOINTS))?.byte(&BLOCKED_JOINTS);
+            let now = arm.read_span(Span::between(&MISSING_SERVOS, &MOVING_JOINTS))?;
+            Ok(self.joints & now.byte(&MOVING_JOINTS) & !now.byte(&MISSING_SERVOS) & !blocked)
+        })
+    }
+
+    /// Waits until none of the joints moves: if a move fails at one joint, the others go on.
+    ///
+    /// # Errors
+    /// The observer ended the wait, a joint still moves after 100 s, or an exchange failed.
+    pub fn wait_for_rest(&self, arm: &mut Arm, observer: &mut dyn Observer) -> Result<(), MoveError> {
+        let start = arm.now();
+        loop {
+            let bits = self.moving(arm)?;
+            if bits == 0 {
+                return Ok(());
+            }
+            if arm.now() >= start + LONGEST_MOVE {
+                return Err(MoveError::StillMoving { bits, after: LONGEST_MOVE });
+            }
+            if !observer.goes_on() {
+                return Err(MoveError::Interrupted);
+            }
+            observer.pause(arm, POLL_PERIOD);
+        }
+    }
+
+    /// Puts them back, with several attempts on a bad line.
+    ///
+    /// # Errors
+    /// [`MoveError::StillMoving`] if a joint of the move moves: another speed would act at once (D11), so nothing is written.
+    /// The registers have other values, or an exchange failed.
+    pub fn put_back(&self, arm: &mut Arm) -> Result<(), MoveError> {
+        match self.moving(arm)? {
+            0 => self.put_back_at_once(arm),
+            bits => Err(MoveError::StillMoving { bits, after: Duration::ZERO }),
+        }
+    }
+
+    /// As [`Self::put_back`], also while a joint moves.
+    pub(super) fn put_back_at_once(&self, arm: &mut Arm) -> Result<(), MoveError> {
+        Ok(arm.put_back(&self.registers)?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::JointMove;
+    use super::*;
+    use crate::fine_angle::FineAngle;
+    use crate::simulated::{self, SimulationConfig};
+
+    #[test]
+    fn after_a_failed_move_the_speeds_are_put_back_when_the_other_joints_rest() {
+        let (mut arm, simulation) = simulated::arm(SimulationConfig::default()).expect("an arm");
+        arm.driven_joints().expect("it is driven");
+        simulation.with(|arm| arm.set_fault("1=stuck".parse().expect("a fault"), None));
+        let targets = [120.0, 130.0, 65.0, 90.0, 90.0, 90.0, 80.0].map(FineAngle::from_degrees);
+        let before = PaceBefore::read(&mut arm, &targets).expect("an answer");
+        let slowly = Pace { speed: Speed::from_steps(5), time: None };
+        let begun = JointMove::begin_at_pace(&mut arm, targets, slowly).expect("taken");
+        assert!(matches!(begun.finish(&mut arm, &mut ()), Err(MoveError::Problems(_))), "joint 1 is blocked");
+        assert!(matches!(before.put_back(&mut arm), Err(MoveError::StillMoving { bits: 0b10, .. })));
+        assert_eq!(before.wait_for_rest(&mut arm, &mut ()), Ok(()));
+        assert_eq!(before.put_back(&mut arm), Ok(()));
+        assert_eq!(arm.read(SPEED.address, 7), Ok(SPEED.default_bytes().to_vec()));
     }
 }

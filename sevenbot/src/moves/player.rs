@@ -7,12 +7,13 @@
 
 use std::time::{Duration, Instant};
 
-use protocol_core::registers::map::{SPEED, TIME, VACUUM_PUMP};
+use protocol_core::registers::map::{SPEED, VACUUM_PUMP};
 
 use super::drive::{POLL_PERIOD, drive};
 use super::error::{ConnectionLost, MoveError};
 use super::joint_move::JointMove;
 use super::observer::Observer;
+use super::pace::PaceBefore;
 use crate::approach::{Approach, ApproachRule, Standing, StartTooFar};
 use crate::arm::Arm;
 use crate::fine_angle::FineAngle;
@@ -23,7 +24,6 @@ use crate::point_path::PointPath;
 use crate::recording::{Moment, Recording};
 use crate::stream::{SetPointStream, StreamError, StreamOptions};
 use crate::units::Speed;
-use host_link::Span;
 
 /// Frequency of the reports while playing, in Hz.
 const FEEDBACK_HZ: u8 = 30;
@@ -62,8 +62,11 @@ pub struct Player {
     rule: ApproachRule,
     /// The speeds of the joints before the first run.
     speeds: [Speed; 7],
+    /// Speeds and durations, as they are to be put back.
+    before: Option<PaceBefore>,
     measured: Vec<(Duration, [FineAngle; 7])>,
     played: u32,
+    has_left_pace: bool,
 }
 
 impl Player {
@@ -76,8 +79,10 @@ impl Player {
             path: PointPath::new(recording, factor),
             rule: ApproachRule::Near,
             speeds: [Speed::MAXIMUM; 7],
+            before: None,
             measured: Vec::new(),
             played: 0,
+            has_left_pace: false,
         }
     }
 
@@ -91,6 +96,12 @@ impl Player {
     #[must_use]
     pub const fn played(&self) -> u32 {
         self.played
+    }
+
+    /// Could the speeds and durations not be put back, because the connection was lost? Then they are those of the recording.
+    #[must_use]
+    pub const fn has_left_pace(&self) -> bool {
+        self.has_left_pace
     }
 
     /// The positions measured during the first run, and their times since its start.
@@ -109,7 +120,8 @@ impl Player {
     /// exchange failed.
     pub fn play(&mut self, arm: &mut Arm, times: u32, observer: &mut dyn Observer) -> Result<(), MoveError> {
         self.check_start(arm, times)?;
-        let before = arm.read_span(Span::between(&SPEED, &TIME))?;
+        let Some(first) = self.moments.first() else { return Ok(()) };
+        let before = self.before.insert(PaceBefore::read(arm, &first.pose.map(Some))?).clone();
         let content = arm.exact_positions()?;
         let done = arm.with_reports(FEEDBACK_HZ, content, |arm| {
             let done = self.play_times(arm, times, observer);
@@ -118,12 +130,13 @@ impl Player {
             }
             done
         });
-        // Without a connection the speeds cannot be restored.
-        if done.as_ref().is_err_and(MoveError::is_connection_lost) {
-            return done;
+        // The speeds come first: if the line is too bad for the rest, the next program does that.
+        let restored = before.put_back_at_once(arm);
+        self.has_left_pace = restored.is_err();
+        if restored.is_ok() && done.as_ref().is_err_and(MoveError::is_connection_lost) {
+            let _ = arm.let_watchdog_act().is_ok_and(|()| arm.end_abandoned_stream().is_ok());
         }
-        let restored = arm.write_checked(before.address, &before.values);
-        done.and(restored.map_err(MoveError::from))
+        done.and(restored)
     }
 
     fn play_times(
@@ -180,8 +193,8 @@ impl Player {
         if arm.has_extended_block()? {
             let options = StreamOptions::new(PERIOD_MS).ok_or(StreamError::NoExtendedBlock)?;
             let mut stream = SetPointStream::open(arm, options)?;
-            stream.approach(&way, observer)?;
-            return Ok(stream.close()?);
+            let done = stream.approach(&way, observer);
+            return self.end_stream(stream, done);
         }
         send_steps(playback::steps(&way.recording(*first), 1.0), &mut Tape::default(), arm, observer)
     }
@@ -209,10 +222,28 @@ impl Player {
         let vacuum = self.moments.first().map(|first| first.vacuum);
         tape.restart(stream.arm());
         let run = MovementRun::along(self.path.clone(), vacuum, stream.arm().elapsed(), options.period());
-        drive(run, &mut stream, observer, |stream, until, observer| {
+        let done = drive(run, &mut stream, observer, |stream, until, observer| {
             tape.take_reports_until(until, stream.arm(), observer)
-        })?;
-        Ok(stream.close()?)
+        });
+        self.end_stream(stream, done)
+    }
+
+    /// Puts the speeds and then the registers of a stream back. If the connection is too bad for that, the stream is left to the
+    /// watchdog of the arm, so that the next program knows of it: [`Arm::end_abandoned_stream`].
+    fn end_stream(
+        &self,
+        mut stream: SetPointStream<'_>,
+        done: Result<(), MoveError>,
+    ) -> Result<(), MoveError> {
+        let put_back =
+            |()| self.before.as_ref().map_or(Ok(()), |before| before.put_back_at_once(stream.arm()));
+        let done = done.and_then(put_back);
+        match &done {
+            Ok(()) => return Ok(stream.close()?),
+            Err(error) if error.is_connection_lost() => stream.leave_to_watchdog(),
+            Err(_) => {}
+        }
+        done
     }
 }
 
@@ -280,4 +311,55 @@ fn move_to(arm: &mut Arm, pose: [FineAngle; 7], observer: &mut dyn Observer) -> 
 /// Why reports are missing.
 fn silent(arm: &mut Arm) -> MoveError {
     arm.driven_joints().err().unwrap_or(MoveError::ReportsStopped)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Stage;
+    use super::*;
+    use crate::simulated::{self, SharedSimulation, SimulationConfig};
+    use protocol_core::registers::map::SET_POINT_PERIOD;
+
+    /// The line to the arm is interrupted on the way, for some seconds.
+    struct Interruption(SharedSimulation, u64);
+
+    impl Observer for Interruption {
+        fn progress(&mut self, stage: Stage, done: u64, _: u64) {
+            if (stage, done) == (Stage::Playing, 50) {
+                let (fault, duration) =
+                    ("line=loss=100%".parse().expect("a fault"), Duration::from_secs(self.1));
+                self.0.with(|arm| arm.set_fault(fault, Some(duration.into())));
+            }
+        }
+    }
+
+    /// The arm after an interruption, and whether the player told that it left the speeds.
+    fn after_interruption(seconds: u64) -> (Arm, bool) {
+        let text = "7bot-recording 1\n0 90 90 65 90 90 90 80 0\n4 130 90 65 90 90 90 80 0\n";
+        let mut player = Player::new(&Recording::parse(text).expect("a recording"), 1.0);
+        let (mut arm, simulation) = simulated::arm(SimulationConfig::default()).expect("an arm");
+        arm.driven_joints().expect("it is driven");
+        arm.write_checked(SPEED.address, &[30; 7]).expect("taken");
+        let failed = player.play(&mut arm, 1, &mut Interruption(simulation.clone(), seconds));
+        let error = failed.expect_err("the line was interrupted");
+        assert!(error.is_connection_lost(), "{error}");
+        simulation.with(|arm| drop(arm.end_faults(None)));
+        (arm, player.has_left_pace())
+    }
+
+    #[test]
+    fn the_speeds_are_put_back_when_the_line_works_again() {
+        let (mut arm, has_left_pace) = after_interruption(3);
+        assert_eq!((has_left_pace, arm.read(SPEED.address, 7)), (false, Ok(vec![30; 7])));
+        assert_eq!(arm.read(SET_POINT_PERIOD.address, 4), Ok(vec![0; 4]));
+    }
+
+    #[test]
+    fn what_a_player_cannot_put_back_the_next_move_does() {
+        let (mut arm, has_left_pace) = after_interruption(3_600);
+        assert_eq!((has_left_pace, arm.read(SPEED.address, 7)), (true, Ok(vec![0; 7])));
+        arm.driven_joints().expect("it is driven");
+        assert_eq!(arm.read(SPEED.address, 7), Ok(SPEED.default_bytes().to_vec()));
+        assert_eq!(arm.read(SET_POINT_PERIOD.address, 4), Ok(vec![0; 4]));
+    }
 }

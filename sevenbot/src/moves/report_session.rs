@@ -7,6 +7,9 @@ use crate::arm::Arm;
 use crate::error::Error;
 use host_link::Span;
 
+/// On a line that loses 3 % of its bytes, one of these arrives 99 times of 100.
+const BLIND_WRITES: usize = 3;
+
 impl Arm {
     /// The most exact positions that this arm reports: a value of register 189.
     ///
@@ -29,8 +32,11 @@ impl Arm {
     ) -> Result<T, E> {
         let before = self.start_reports(hz, content)?;
         let done = work(self);
-        // Without a connection the registers cannot be restored.
+        // Without a connection no answer confirms a write, so each is sent several times.
         if done.as_ref().is_err_and(E::is_connection_lost) {
+            for (address, values) in [&before; BLIND_WRITES].into_iter().flatten() {
+                let _ = self.write(*address, values);
+            }
             return done;
         }
         let restored = self.write_all_checked(&before);

@@ -13,6 +13,13 @@ const FILE: &str = "names";
 /// More names are forgotten, the oldest first.
 const MOST_NAMES: usize = 256;
 
+/// Why there is no place for the file.
+const NO_DIRECTORY: &str = if cfg!(unix) {
+    "there is no state directory that only this user can write to: set XDG_STATE_HOME to the path of a directory of your own"
+} else {
+    "names are remembered on Linux and macOS only"
+};
+
 /// A name, and where the arm was last.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct KnownName {
@@ -69,9 +76,7 @@ fn read(file: &Path) -> Vec<KnownName> {
 }
 
 fn change(change: impl FnOnce(&mut Vec<KnownName>)) -> io::Result<()> {
-    let directory = state_directory().ok_or_else(|| {
-        io::Error::new(ErrorKind::NotFound, "there is no state directory that only this user can write to")
-    })?;
+    let directory = state_directory().ok_or_else(|| io::Error::new(ErrorKind::NotFound, NO_DIRECTORY))?;
     let mut names = read(&directory.join(FILE));
     let before = names.clone();
     change(&mut names);

@@ -110,7 +110,13 @@ const fn announced(_: &str) -> Option<KnownName> {
 
 /// `host`: the connection is encrypted, and the certificate is for this host.
 fn connect_tcp(address: &str, host: Option<&str>, token: Option<&str>) -> Result<Box<dyn Stream>, OpenError> {
-    let addresses = std::net::ToSocketAddrs::to_socket_addrs(address).map_err(|error| failed(&error))?;
+    let addresses =
+        std::net::ToSocketAddrs::to_socket_addrs(address).map_err(|error| match error.kind() {
+            ErrorKind::InvalidInput => OpenError::Unusable(
+                "its port number is missing or wrong: use HOST:PORT, as 10.0.0.5:7777".to_owned(),
+            ),
+            _ => failed(&error),
+        })?;
     let mut last = OpenError::NotFound;
     for address in addresses {
         let stream = TcpStream::connect_timeout(&address, CONNECT_TIMEOUT);
@@ -236,6 +242,14 @@ mod tests {
     fn the_host_of_an_address_has_no_port_and_no_brackets() {
         for (address, wanted) in [("lab-3:7777", "lab-3"), ("10.0.0.5:1", "10.0.0.5"), ("[::1]:7", "::1")] {
             assert_eq!(host(address), wanted);
+        }
+    }
+
+    #[test]
+    fn an_address_without_a_port_number_is_an_error() {
+        for address in ["127.0.0.1", "127.0.0.1:", "lab-3:http"] {
+            let error = SocketLine::connect(&Address::Tcp(address.to_owned()), None).expect_err(address);
+            assert!(error.to_string().contains("port number is missing or wrong"), "{address}: {error}");
         }
     }
 

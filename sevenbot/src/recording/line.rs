@@ -53,8 +53,13 @@ pub enum LineError {
     #[error("`{0}` is not a time in seconds, up to a day")]
     Time(String),
     /// The time is not later than that of the moment before.
-    #[error("the time is not later than the one before")]
-    NotLater,
+    #[error("the time {} s is not later than {} s, the one before", time.as_secs_f64(), before.as_secs_f64())]
+    NotLater {
+        /// The time of this moment.
+        time: Duration,
+        /// The time of the moment before.
+        before: Duration,
+    },
     /// The text is not an angle in whole degrees from 0 to 180.
     #[error("joint {} cannot go to `{text}`: whole degrees from 0 to 180", joint.number())]
     Angle {
@@ -76,7 +81,8 @@ pub enum LineError {
     Vacuum(String),
     /// The joint would have to move faster than its motor.
     #[error(
-        "joint {} would have to turn at {degrees_per_second:.0} °/s; the motors reach {:.0}",
+        "joint {} would have to turn at {degrees_per_second:.0} °/s; the motors reach {:.0}: give this \
+         line a later time, or play slower",
         joint.number(),
         Speed::MAXIMUM.degrees_per_second()
     )]

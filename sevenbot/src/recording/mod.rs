@@ -107,8 +107,8 @@ impl Recording {
         for (number, moment) in numbered {
             let at_line = |cause| RecordingError::Line { number, cause };
             let moment = moment.map_err(at_line)?;
-            if moments.last().is_some_and(|(_, before)| moment.time <= before.time) {
-                return Err(at_line(LineError::NotLater));
+            if let Some((_, before)) = moments.last().filter(|(_, before)| moment.time <= before.time) {
+                return Err(at_line(LineError::NotLater { time: moment.time, before: before.time }));
             }
             moments.push((number, moment));
         }
@@ -221,7 +221,10 @@ mod tests {
         assert_eq!(line("x 90 90 65 90 90 90 80 0"), "line 6: `x` is not a time in seconds, up to a day");
         assert!(line("-1 90 90 65 90 90 90 80 0").contains("`-1` is not a time"));
         assert!(line("NaN 90 90 65 90 90 90 80 0").contains("`NaN` is not a time"));
-        assert!(line("1.5 90 90 65 90 90 90 80 0").contains("not later"));
+        assert_eq!(
+            line("1.5 90 90 65 90 90 90 80 0"),
+            "line 6: the time 1.5 s is not later than 1.5 s, the one before"
+        );
         let angle = line("2 90 90 181 90 90 90 80 0");
         assert_eq!(angle, "line 6: joint 3 cannot go to `181`: whole degrees from 0 to 180");
         assert!(line("2 90 90 65.5 90 90 90 80 0").contains("whole degrees"));
@@ -233,7 +236,10 @@ mod tests {
         let recording = Recording::parse(WAVE).expect("a recording");
         assert_eq!(recording.check_speeds(1.0), Ok(()));
         let text = recording.check_speeds(20.0).expect_err("30 degrees in 75 ms").to_string();
-        assert_eq!(text, "line 5: joint 1 would have to turn at 400 °/s; the motors reach 372");
+        assert_eq!(
+            text,
+            "line 5: joint 1 would have to turn at 400 °/s; the motors reach 372: give this line a later time, or play slower"
+        );
     }
 
     #[test]

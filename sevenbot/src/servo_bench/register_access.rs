@@ -81,6 +81,8 @@ pub fn set(
 ) -> Result<ServoValue, SetError> {
     let bytes = register.encode(checked(register, value)?);
     if register.memory == ServoMemory::Eeprom {
+        // Nothing is written to a servo that does not answer.
+        bus.read(id, register::LOCK, 1)?;
         bus.write(id, register::LOCK, &[0]).map_err(SetError::StaysLocked)?;
         let written = write_setting(bus, id, register, &bytes);
         // Lock the EEPROM again after a failure too.
@@ -152,6 +154,14 @@ mod tests {
             assert_eq!(set(&mut bus, 3, &register, value), Err(SetError::OutOfRange { register, value }));
         }
         assert_eq!(wire.lock().unwrap().sent.len(), 0);
+    }
+
+    #[test]
+    fn a_silent_servo_gets_no_write() {
+        let (mut bus, wire) = bus(vec![SimulatedServo::new(3)]);
+        let refused = set(&mut bus, 4, row("max-torque"), 600);
+        assert!(matches!(refused, Err(SetError::Bus(ServoError::NoAnswer { id: 4, .. }))), "{refused:?}");
+        assert!(wire.lock().unwrap().sent.iter().all(|frame| frame[4] == 2), "only reads");
     }
 
     #[test]

@@ -45,8 +45,12 @@ pub enum SetIdError {
 }
 
 fn not_alone(answering: &[FoundServo]) -> String {
-    if answering.is_empty() {
-        return "no servo answers at this baud rate".to_owned();
+    match answering {
+        [] => return "no servo answers at this baud rate".to_owned(),
+        [FoundServo { id, answers: AnswerQuality::Good, .. }] => {
+            return format!("the only servo that answers has another id: {id}");
+        }
+        _ => {}
     }
     let ids: Vec<String> = answering.iter().map(id_text).collect();
     format!("the servo has to be the only one on the bus, but these ids answer: {}", ids.join(", "))

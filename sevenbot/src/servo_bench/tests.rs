@@ -191,7 +191,7 @@ fn a_new_id_needs_exactly_one_servo() {
     let garbled = SimulatedServo::with(4, ServoFault::Garbled(1));
     for (servos, says) in [
         (vec![SimulatedServo::new(1), SimulatedServo::new(200)], "these ids answer: 1, 200"),
-        (vec![SimulatedServo::new(2)], "these ids answer: 2"),
+        (vec![SimulatedServo::new(2)], "the only servo that answers has another id: 2"),
         (vec![SimulatedServo::new(1), garbled], "1, 4 (damaged answers)"),
         (vec![SimulatedServo::new(1), SimulatedServo::new(1)], "1 (several servos)"),
         (vec![], "no servo answers"),

@@ -9,7 +9,7 @@ use protocol_core::registers::JOINTS;
 use protocol_core::time::Duration;
 
 use super::observation::Number;
-use super::step_error::StepError;
+use super::step_error::{MOST, StepError};
 
 /// The numbers of a measurement: seven positions in degrees, seven velocities in degrees per second, seven loads in percent of
 /// the stall torque, as in an observation. A joint whose position is NaN is moved by the simulation here.
@@ -22,9 +22,6 @@ pub const SET_POINTS: Range<usize> = 0..7;
 pub const SET_VELOCITIES: Range<usize> = 7..14;
 /// 1: the motor drives its joint; 2: it damps it; 0: it does neither.
 pub const DRIVES: Range<usize> = 14..21;
-
-/// Measurements beyond this are no degrees, and no degrees per second.
-const MOST: f64 = 100_000.0;
 
 /// The first measurement that is no number where the position is one.
 pub(super) fn check<T: Number>(measured: &[T]) -> Result<(), StepError> {

@@ -2,6 +2,9 @@
 
 use std::time::Duration;
 
+/// Measurements beyond this are no degrees, and no degrees per second.
+pub(super) const MOST: f64 = 100_000.0;
+
 /// Why the arms did not step. No time has passed for any of them.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum StepError {
@@ -16,7 +19,10 @@ pub enum StepError {
         degrees: f64,
     },
     /// A measurement of another simulation is not a number, or far too large.
-    #[error("arm {arm}, joint {joint}: a measurement of {value} is out of range")]
+    #[error(
+        "arm {arm}, joint {joint}: a measurement of {value} is out of range: use -{MOST} to {MOST}, or NaN as the position of a \
+         joint that is simulated here"
+    )]
     Measured {
         /// The number of the arm, from 0.
         arm: usize,

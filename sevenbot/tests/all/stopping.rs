@@ -11,6 +11,7 @@ use crate::fake::{
 use protocol_core::request::Request;
 use sevenbot::checked_write::WriteError;
 use sevenbot::hold::HoldError;
+use sevenbot::moves::MoveError;
 use sevenbot::{Arm, ArmOptions, Error};
 
 /// Each lost frame costs one timeout. The many attempts allow a busy machine ten seconds.
@@ -29,6 +30,22 @@ fn a_stop_succeeds_despite_one_lost_frame() {
             assert_eq!(registers.lock().unwrap()[46..53], POSE, "{fault:?} {faulty_frame}");
         }
     }
+}
+
+#[test]
+fn an_arm_that_is_lost_while_its_hold_is_watched_may_be_moving() {
+    let registers = moving_registers();
+    let (name, _port) = scripted_arm(move |_, request| match request {
+        // The watch begins with this read.
+        Request::Read { address: 29, count: 2 } => Vec::new(),
+        _ => execute(&mut registers.lock().unwrap(), request),
+    });
+    let options = ArmOptions { attempts: 1, ..OPTIONS };
+    let lost = Arm::open_with(&name, options).unwrap().hold_and_watch();
+    assert!(
+        matches!(lost, Err(MoveError::MayMove(WriteError::Exchange(Error::NoAnswer { .. })))),
+        "{lost:?}"
+    );
 }
 
 #[test]

@@ -164,7 +164,7 @@ impl Page {
         self.call("Browser.setDownloadBehavior", behaviour);
     }
 
-    /// Chooses a file.
+    /// Gives a file to the file input that `selector` finds.
     #[track_caller]
     pub fn choose_file(&mut self, selector: &str, file: &Path) {
         let root = &self.call("DOM.getDocument", json!({}))["root"]["nodeId"];

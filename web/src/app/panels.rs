@@ -163,7 +163,7 @@ fn show_joints(dom: &Dom, language: Language, state: &ArmState) {
     }
 }
 
-/// The sliders and the numbers beside them at the targets, in steps of what the arm can take.
+/// Sets the sliders, the numbers beside them and those of the tip to the targets. `step` is what the arm can take, in degrees.
 fn show_targets(dom: &Dom, state: &ArmState, step: &str) {
     for (number, target) in (1..).zip(state.targets) {
         for id in [format!("joint-{number}"), format!("target-{number}")] {

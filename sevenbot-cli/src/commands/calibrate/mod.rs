@@ -23,7 +23,7 @@ use crate::confirm::confirm;
 use crate::interrupt::hold_on_interrupt;
 use crate::printer::{Printable, note, warn};
 use crate::session::Session;
-use crate::step_target::step_target;
+use crate::step_target::{out_of_range, step_target};
 use crate::watch::ProgressWatch;
 use crate::write_result::uses_offsets_after_restart;
 use sevenbot::moves::JointMove;
@@ -90,8 +90,9 @@ fn store(
     wanted: Offsets,
 ) -> Result<(), CommandError> {
     if wanted != before {
-        let mut err = anstream::stderr();
-        OffsetTable::new(before, wanted).write_text(&mut err)?;
+        if !args.yes {
+            OffsetTable::new(before, wanted).write_text(&mut anstream::stderr())?;
+        }
         let is_late = uses_offsets_after_restart(&arm);
         let effect =
             if is_late { "The arm uses them after its next restart." } else { "The arm moves a little." };
@@ -170,13 +171,14 @@ fn ask_offset(arm: &mut Arm, joint: Joint, offset: i16) -> Result<i16, CommandEr
 /// Moves one joint. A refusal is only a warning.
 fn nudge(arm: &mut Arm, joint: Joint, degrees: i16) -> Result<(), CommandError> {
     let moved = hold_on_interrupt(arm, |arm, interrupt| {
-        let wanted = step_target(&arm.driven_joints()?, joint, degrees)?.max(0);
-        let wanted = u8::try_from(wanted).unwrap_or(u8::MAX).min(Angle::MAX_DEGREES);
-        let targets = Joint::ALL.map(|other| (other == joint).then_some(wanted));
+        let wanted = step_target(&arm.driven_joints()?, joint, degrees)?;
+        let angle = u8::try_from(wanted).ok().and_then(Angle::from_degrees);
+        let angle = angle.ok_or_else(|| out_of_range(joint, wanted))?;
+        let targets = Joint::ALL.map(|other| (other == joint).then_some(angle.degrees()));
         Ok(JointMove::begin(arm, targets)?.finish(arm, &mut ProgressWatch::new(interrupt))?)
     });
     match moved {
-        Err(CommandError::Arm(reason)) => warn(reason),
+        Err(CommandError::Arm(reason) | CommandError::WithAdvice { message: reason, .. }) => warn(reason),
         Err(failure) => return Err(failure),
         Ok(_) => {}
     }

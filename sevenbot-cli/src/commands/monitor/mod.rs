@@ -59,7 +59,7 @@ pub(crate) struct MonitorArgs {
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = value_parser!(u8).range(1..=50))]
     hz: u8,
     /// End after N samples. Prints lines, even on a terminal.
-    #[arg(long, value_name = "N", value_parser = value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "N", value_parser = value_parser!(u64).range(1..=1_000_000_000))]
     samples: Option<u64>,
     /// Write all values to FILE, separated by commas.
     #[arg(long, value_name = "FILE", conflicts_with = "json")]

@@ -83,7 +83,8 @@ pub(crate) struct MoveToArgs {
     #[arg(long)]
     pub(super) straight: bool,
     /// Speed of the tip on the straight line, 1mm/s to 500mm/s.
-    #[arg(long, value_name = "MM/S", default_value = "50mm/s", requires = "straight", value_parser = speed)]
+    #[arg(long, value_name = "MM/S", default_value = "50mm/s", requires = "straight",
+          allow_hyphen_values = true, value_parser = speed)]
     pub(super) speed: f64,
     /// Wait until the joints have arrived, and show the position of the tip.
     #[arg(long)]

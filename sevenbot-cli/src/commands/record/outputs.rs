@@ -91,7 +91,13 @@ impl Outputs {
             note(format_args!("{} is complete up to {seconds:.1} s, {moments} moments", path.display()));
         }
         if let Some(McapFile { path, writer }) = &self.mcap {
-            note(format_args!("{} has the first {} moments", path.display(), writer.written()));
+            let place = if is_stdout(path) { "standard output".into() } else { path.display().to_string() };
+            let moments = match writer.written() {
+                0 => "no whole moment".to_owned(),
+                1 => "the first moment".to_owned(),
+                count => format!("the first {count} moments"),
+            };
+            note(format_args!("{place} has {moments}"));
         }
     }
 

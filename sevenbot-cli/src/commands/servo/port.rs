@@ -2,10 +2,11 @@
 
 use clap::{Args, builder::RangedI64ValueParser, value_parser};
 use sevenbot::servo_bench::{BAUD_RATES, BusMaster, BusOptions, MAX_ID, ServoError};
+use sevenbot::simulated::simulated_port;
 use sevenbot::{Arm, ArmOptions, ReceiveCounts, ports};
 
 use crate::command_error::CommandError;
-use crate::session::Session;
+use crate::session::{Session, check_is_no_server};
 
 /// The baud rate of the bus.
 #[derive(Clone, Copy, Debug, Args)]
@@ -28,8 +29,16 @@ pub(super) fn id() -> RangedI64ValueParser<u8> {
 
 /// The adapter's port. It must be given: a search would send bytes to other devices.
 pub(super) fn port(session: &Session) -> Result<String, CommandError> {
+    let usage = |text: &str| CommandError::Usage(text.to_owned());
     let how = "`sevenbot servo` needs the adapter's port: use --port PORT or set SEVENBOT_PORT";
-    session.port.clone().ok_or_else(|| CommandError::Usage(how.to_owned()))
+    let port = session.port.clone().ok_or_else(|| usage(how))?;
+    if simulated_port(&port).is_some() {
+        return Err(usage(
+            "--port sim has no servo bus: start `host-sim --servos-only --link ./bus`, and use --port ./bus",
+        ));
+    }
+    check_is_no_server(&port)?;
+    Ok(port)
 }
 
 /// Opens the bus.

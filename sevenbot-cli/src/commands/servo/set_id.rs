@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use clap::{Args, value_parser};
 use serde::Serialize;
-use sevenbot::servo_bench::scan::ScanPlan;
+use sevenbot::servo_bench::scan::{AnswerQuality, FoundServo, ScanPlan};
 use sevenbot::servo_bench::set_id::{SetIdError, set_id};
 
 use super::port::{Rate, exchange_error, id, open};
@@ -69,10 +69,7 @@ pub(super) fn run(session: &mut Session, args: &SetIdArgs) -> Result<(), Command
 /// Advice to the user.
 fn advice(error: &SetIdError) -> &'static [&'static str] {
     match error {
-        SetIdError::NotAlone { answering } if answering.is_empty() => {
-            &["`sevenbot servo scan` tries all baud rates", "do the servos have their own power?"]
-        }
-        SetIdError::NotAlone { .. } => &["unplug the other servos; nothing was written"],
+        SetIdError::NotAlone { answering } => not_alone(answering),
         SetIdError::StaysLocked(_) | SetIdError::Unchanged => {
             &["switch the servo's power off and on, and try again: it still has its old id"]
         }
@@ -83,5 +80,16 @@ fn advice(error: &SetIdError) -> &'static [&'static str] {
         SetIdError::AnswersToBoth => &["unplug all servos but one, then look with `sevenbot servo scan`"],
         SetIdError::StaysOpen(_) => &["switch the servo's power off and on: that locks it"],
         SetIdError::Bus(error) => servo(error),
+    }
+}
+
+const fn not_alone(answering: &[FoundServo]) -> &'static [&'static str] {
+    match answering {
+        [] => &["`sevenbot servo scan` tries all baud rates", "do the servos have their own power?"],
+        [FoundServo { answers: AnswerQuality::Good, .. }] => &[
+            "nothing was written: if the servo is to have that id, nothing is left to do",
+            "otherwise name that id first: `sevenbot servo set-id ID NEW`",
+        ],
+        _ => &["unplug the other servos; nothing was written"],
     }
 }

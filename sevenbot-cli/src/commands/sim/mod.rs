@@ -117,7 +117,7 @@ struct FaultArgs {
     /// With 'clear': the joint, or line, supply, flash, bus or arm.
     at: Option<String>,
     /// The duration, as 2s or 500ms; without it the fault stays until it is cleared.
-    #[arg(long = "for", value_name = "TIME", value_parser = millis)]
+    #[arg(long = "for", value_name = "TIME", allow_hyphen_values = true, value_parser = millis)]
     for_ms: Option<u64>,
 }
 

@@ -1,6 +1,7 @@
 //! Set-points from standard input: parsing of the lines, and a thread that reads them.
 
 use std::io::{self, BufRead};
+use std::mem::replace;
 use std::sync::mpsc::{Receiver, sync_channel};
 use std::thread;
 use std::time::Duration;
@@ -8,6 +9,8 @@ use std::time::Duration;
 use serde::Deserialize;
 use sevenbot::FineAngle;
 use sevenbot::fine::FineTargets;
+
+use crate::printer::warn;
 
 /// Lines that wait to be sent. The thread that reads stops there.
 const LINES_AHEAD: usize = 1_024;
@@ -29,7 +32,7 @@ pub(super) struct TimedPoint {
 #[serde(deny_unknown_fields)]
 struct JsonLine {
     t: f64,
-    joints: [Option<f64>; 7],
+    joints: Vec<Option<f64>>,
 }
 
 /// Reads the set-points in a thread of its own. The channel ends with the input, or after the first error.
@@ -55,6 +58,8 @@ pub(super) fn read_in_background() -> Receiver<Result<TimedPoint, String>> {
 struct InputLines {
     number: usize,
     last: Option<Duration>,
+    /// Has a line had the vacuum on?
+    has_vacuum: bool,
 }
 
 impl InputLines {
@@ -62,17 +67,36 @@ impl InputLines {
     /// words.
     fn next(&mut self, line: &str) -> Result<Option<TimedPoint>, String> {
         self.number += 1;
-        let line = line.trim_start_matches('\u{feff}').trim();
+        let line = self.without_vacuum(line.trim_start_matches('\u{feff}').trim());
         if line.is_empty() || (self.number == 1 && is_heading(line)) {
             return Ok(None);
         }
         let point = if line.starts_with('{') { json(line) } else { table(line) };
         let point = point.map_err(|reason| format!("line {}: {reason}", self.number))?;
-        if self.last.is_some_and(|last| point.time <= last) {
-            return Err(format!("line {}: the time is not later than the one before", self.number));
+        if let Some(last) = self.last.filter(|last| point.time <= *last) {
+            let (time, last) = (point.time.as_secs_f64(), last.as_secs_f64());
+            let reason = format!("the time {time} s is not later than {last} s, the one before");
+            return Err(format!("line {}: {reason}", self.number));
         }
         self.last = Some(point.time);
         Ok(Some(point))
+    }
+
+    /// The line without the last column of a recording as CSV, the vacuum. Warns once if it is on.
+    fn without_vacuum<'line>(&mut self, line: &'line str) -> &'line str {
+        match line.rsplit_once(',') {
+            Some((rest, vacuum))
+                if !line.starts_with('{')
+                    && rest.split(',').count() == FIELDS
+                    && ["vacuum", "0", "1"].contains(&vacuum.trim()) =>
+            {
+                if vacuum.trim() == "1" && !replace(&mut self.has_vacuum, true) {
+                    warn("a stream does not switch the vacuum pump: `sevenbot play` does");
+                }
+                rest
+            }
+            _ => line,
+        }
     }
 }
 
@@ -85,8 +109,11 @@ fn json(line: &str) -> Result<TimedPoint, String> {
     let JsonLine { t, joints } = serde_json::from_str(line).map_err(|error| {
         // The line number of the parser is always 1.
         let error = error.to_string();
-        error.split(" at line ").next().unwrap_or_default().to_owned()
+        let reason = error.split(" at line ").next().unwrap_or_default();
+        format!("{reason}; a line is {{\"t\": SECONDS, \"joints\": [A1, A2, A3, A4, A5, A6, A7]}}")
     })?;
+    let joints =
+        joints.try_into().map_err(|joints: Vec<_>| format!("{} angles instead of 7", joints.len()))?;
     point(t, joints)
 }
 
@@ -148,6 +175,21 @@ mod tests {
     }
 
     #[test]
+    fn a_recording_as_csv_has_the_vacuum_after_the_angles() {
+        let text = |vacuum| {
+            let names = "seconds,joint_1,joint_2,joint_3,joint_4,joint_5,joint_6,joint_7,vacuum";
+            format!("{names}\n0.000,90.00,90.00,65.00,90.00,90.00,90.00,80.00,{vacuum}\n")
+        };
+        for vacuum in ["0", "1"] {
+            assert_eq!(parsed(&text(vacuum)).map(|points| points.len()), Ok(1));
+        }
+        assert_eq!(
+            parsed(&text("80")),
+            Err("line 2: 9 fields instead of 8: seconds and seven angles".to_owned())
+        );
+    }
+
+    #[test]
     fn a_bad_first_line_is_no_heading() {
         for (line, says) in [
             ("abc", "line 1: 1 fields instead of 8"),
@@ -170,11 +212,14 @@ mod tests {
             refused("1,90,90,65,90,90,90,180.01"),
             "line 2: joint 7 cannot go to 180.01°: it takes 0 to 180"
         );
-        assert_eq!(refused("0,90,90,65,90,90,90,80"), "line 2: the time is not later than the one before");
+        assert_eq!(
+            refused("0,90,90,65,90,90,90,80"),
+            "line 2: the time 0 s is not later than 0 s, the one before"
+        );
         assert!(refused("-1,90,90,65,90,90,90,80").contains("-1 is not a time"));
         assert!(refused("NaN,90,90,65,90,90,90,80").contains("is not a time"));
-        assert!(refused("{\"t\": 1, \"joints\": [1, 2]}").starts_with("line 2: invalid length 2"));
-        assert!(refused("{\"t\": 1}").contains("missing field `joints`"));
+        assert!(refused("{\"t\": 1, \"joints\": [1, 2]}").starts_with("line 2: 2 angles instead of 7"));
+        assert!(refused("{\"t\": 1}").contains("missing field `joints`; a line is {\"t\": SECONDS"));
         assert!(refused("t,j1,j2,j3,j4,j5,j6,j7").contains("not a number"), "a heading is the first line");
     }
 }

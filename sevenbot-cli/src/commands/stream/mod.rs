@@ -52,6 +52,9 @@ degrees, 0 to 180:
                                     as JSON; null: this joint gets no point
   0.02, 90.25, 88, 65, 90, 90, 90,  or separated by commas; empty: no point
 
+A recording that `sevenbot convert` wrote as CSV is taken, too; its last column,
+the vacuum, is not sent.
+
 The first point has to be within 5 degrees of where each joint stands, and is
 approached at up to 30 degrees per second. Further away it is refused with the
 distance of each joint, unless --approach goes there first. A joint whose first
@@ -81,7 +84,8 @@ no stream.
 Exit status 1 after a bad line, if the first point is refused, if the arm takes
 no stream, and if it does not follow:
 a joint of the stream is blocked, let go or silent, the servos have no supply,
-or the controller restarted. The message tells what to do.")]
+another program stops the arm, or the controller restarted. The message tells
+what to do.")]
 pub(crate) struct StreamArgs {
     /// Time between two points in milliseconds, 5 to 1000.
     #[arg(long, value_name = "MS", default_value_t = 20, value_parser = value_parser!(u16).range(5..=1_000))]

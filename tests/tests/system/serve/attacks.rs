@@ -403,7 +403,7 @@ fn what_was_sent_to_a_suspended_server_moves_nothing() {
     let mut streams = [served.connect(), served.connect()];
     let mut local = UnixStream::connect(served.local_socket()).expect("a connection");
     let mut web = WebClient::connect(&served, &[]).expect("accepted");
-    // All of them have been idle for a while.
+    // The server has to see that nothing waits in any connection.
     thread::sleep(Duration::from_millis(500));
     process::send_signal(&served.server, Signal::STOP);
     arm.write(TARGET_POSITION, &[120]);

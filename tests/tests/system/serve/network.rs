@@ -82,6 +82,8 @@ fn a_name_is_found_on_the_network() {
         listed.contains("known, and not announced now") && listed.contains(&port)
     });
     assert!(run(&["ports", "--forget", &name]).status.success());
+    let again = run(&["ports", "--forget", &name]);
+    assert!(all_of(&again).contains("is not a known name"), "{}", all_of(&again));
     assert!(!all_of(&run(&["ports", "--network"])).contains(&port));
 }
 

@@ -2,21 +2,24 @@
 
 use std::io::{ErrorKind, Read, Write};
 use std::path::Path;
-use std::process::Output;
+use std::process::{Output, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
 use system_tests::frames::{reply, with_checksum};
-use system_tests::process::{Signal, send_signal, wait_for_exit};
+use system_tests::process::{RunningProgram, Signal, send_signal, wait_for_exit};
 use system_tests::programs::tool;
 use system_tests::registers::{CHIP_ID, DEVICE_CODE, FEEDBACK_FREQUENCY, PRESENT_POSITION, SPEED};
 use system_tests::relay::Passing;
-use system_tests::wait::TIMEOUT;
+use system_tests::wait::{TIMEOUT, wait_until};
 use system_tests::{read_request, write_request};
 
 use super::served::{Served, exchange, names, simulator};
+
+/// First of the set-point period (two bytes), time and action of the watchdog.
+const SET_POINT_PERIOD: u8 = 184;
 
 #[test]
 fn programs_on_terminals_and_tcp_get_their_own_replies() {
@@ -192,6 +195,32 @@ fn with_read_only_programs_look_and_move_nothing() {
     let served = Served::start(1, &["--read-only"]);
     let mut arm = served.open("a");
     assert_eq!(arm.write_and_read((SPEED, &[7]), (SPEED, 1)), [60]);
+}
+
+#[test]
+fn a_stream_that_another_program_stops_says_so_and_leaves_no_period() {
+    let served = Served::start(2, &[]);
+    let program = |name: &str, command: &str| {
+        let mut tool = tool();
+        tool.arg("--port").arg(served.folder.path().join(name)).arg(command);
+        tool
+    };
+    let mut streams = program("a", "stream");
+    streams.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut stream = RunningProgram::spawn(&mut streams);
+    let lines = "0,90,90,65,90,90,90,80\n20,150,90,65,90,90,90,80\n";
+    // The pipe stays open until the stream ends.
+    stream.stdin.as_mut().expect("a pipe").write_all(lines.as_bytes()).expect("the tool reads");
+    let mut arm = served.open("b");
+    wait_until("joint 1 moves", || arm.register(PRESENT_POSITION) > 92);
+    drop(arm);
+    let stopped = program("b", "stop").output().expect("the tool runs");
+    assert!(stopped.status.success(), "{}", all_of(&stopped));
+    let ended = stream.output();
+    let said = all_of(&ended);
+    assert_eq!(ended.status.code(), Some(1), "{said}");
+    assert!(said.contains("another program stopped the arm"), "{said}");
+    assert_eq!(served.open("b").read(SET_POINT_PERIOD, 4), [0; 4]);
 }
 
 #[test]

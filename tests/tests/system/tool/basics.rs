@@ -236,8 +236,12 @@ fn without_a_connection_the_tool_suggests_what_to_check() {
     with_arm(TestSetup::any(), |arm| {
         let port = arm.lend_port();
         let holder = system_tests::ArmClient::open(&port, 115_200);
-        let text = failed(&run(&["--port", port.to_str().expect("UTF-8"), "info"]), 3);
+        let port = port.to_str().expect("UTF-8");
+        let text = failed(&run(&["--port", port, "info"]), 3);
         assert!(text.contains("another program has this port open"), "{text}");
+        let text = failed(&run(&["--port", port, "stop", "--all"]), 3);
+        assert!(text.contains(&format!("{port}: the arm received no stop and may be moving")), "{text}");
+        assert!(!text.contains("no serial port"), "{text}");
         drop(holder);
         arm.reopen(115_200);
     });

@@ -8,7 +8,7 @@ use super::output::{all_output, failed, succeeded, words};
 use system_tests::arm_control::ArmControl;
 use system_tests::process::RunningProgram;
 use system_tests::programs::{sevenbot, tool};
-use system_tests::registers::{EEPROM_LOCK, MOTOR_STATE, OFFSET};
+use system_tests::registers::{EEPROM_LOCK, MOTOR_STATE, OFFSET, STANDARD_POSE, TARGET_POSITION};
 use system_tests::started_arm::{ArmKind, StartedArm};
 use system_tests::terminal::Terminal;
 use system_tests::{Need, TestArm, TestSetup, near, with_arm};
@@ -59,9 +59,22 @@ fn calibration_shows_and_resets_offsets_and_needs_answers() {
         let text = failed(&with_input(arm, &["calibrate", "--yes"], "\n95\n"), 2);
         assert!(text.contains("the input has ended"), "{text}");
         assert_eq!(arm.read(OFFSET, 7), [0x85, 12, 0, 0, 0, 0, 0], "nothing was written");
-        succeeded(arm.sevenbot(&["calibrate", "--reset", "--yes"]));
+        let output = arm.sevenbot(&["calibrate", "--reset", "--yes"]);
+        assert_eq!(all_output(&output).matches("offset").count(), 1, "one table: {}", all_output(&output));
+        succeeded(output);
         assert_eq!(arm.read(OFFSET, 7), [0; 7]);
         assert_eq!(arm.register(EEPROM_LOCK), 1, "closed again");
+    });
+}
+
+#[test]
+fn a_step_out_of_range_is_refused() {
+    with_arm(TestSetup::any(), |arm| {
+        let output = with_input(arm, &["calibrate", "--yes"], "+200\n-1000\nq\n");
+        let text = failed(&output, 1);
+        assert!(text.contains("joint 1 would go to 290°: it takes 0 to 180"), "{text}");
+        assert!(text.contains("joint 1 would go to -910°"), "{text}");
+        assert_eq!(arm.register(TARGET_POSITION), STANDARD_POSE[0], "nothing was moved");
     });
 }
 

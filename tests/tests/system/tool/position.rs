@@ -122,13 +122,13 @@ fn the_way_to_a_point_is_guarded_and_joints_only_warn() {
         // Both ends are 5 mm above this table, and the line between them.
         let line = ["move-to", "50", "185", "50", "--table", "45", "--straight", "--dry-run"];
         succeeded(arm.sevenbot(&line));
-        // Joint 1 arrives last, so the tip is lower than both ends on the way to a point further away.
-        let text = failed(&arm.sevenbot(&["move-to", "0", "300", "0", "--straight", "--table", "30"]), 1);
-        assert!(
-            text.contains("below the table at z = 30 mm") && text.contains("nothing was moved"),
-            "{text}"
-        );
+        // Joint 2 leads and joint 3 follows slowly, so the tip is lower on the way than at both ends.
+        arm.write(SPEED, &[60, 60, 10, 60, 60, 60, 60]);
+        let text = failed(&arm.sevenbot(&["move-to", "0", "300", "100", "--table", "45"]), 1);
+        let is_refused = text.contains("the way there is not allowed") && text.contains("nothing was moved");
+        assert!(is_refused && text.contains("below the table at z = 45 mm"), "{text}");
         assert_eq!(arm.read(TARGET_POSITION, 7), before);
+        arm.write(SPEED, &[60; 7]);
         let into_base = ["pose", "90", "140", "180", "90", "90", "90", "80", "--speed", "1"];
         let warned = arm.sevenbot(&into_base);
         let text = all_output(&warned);

@@ -182,7 +182,8 @@ fn set_id_changes_the_only_servo_permanently() {
         bus.wait_for(3);
         let text = succeeded(bus.servo(&["info", "3"]));
         assert_eq!(words(&text, "EEPROM lock"), ["EEPROM", "lock", "locked"]);
-        failed(&bus.servo(&["set-id", "1", "4"]), 1);
+        let text = failed(&bus.servo(&["set-id", "1", "4"]), 1);
+        assert!(text.contains("has another id: 3") && text.contains("nothing is left to do"), "{text}");
     }
 }
 
@@ -268,6 +269,10 @@ fn errors_of_ports_are_explained() {
     assert!(text.contains("needs the adapter's port"), "{text}");
     let text = failed(&run_without_arm(&["--port", "/dev/no-such-port", "servo", "info", "0"]), 3);
     assert!(text.contains("there is no such port"), "{text}");
+    let text = failed(&run_without_arm(&["--port", "sim:foo", "info"]), 3);
+    assert!(text.contains("a simulated arm is sim, or sim:SEED"), "{text}");
+    let text = failed(&run_without_arm(&["--port", "sim", "servo", "scan"]), 2);
+    assert!(text.contains("--port sim has no servo bus"), "{text}");
     let bus = SimulatedAdapter::start(&["--ids", "0"], 0);
     let holder = ArmClient::open(&bus.port, 1_000_000);
     let text = failed(&bus.servo(&["info", "0"]), 3);

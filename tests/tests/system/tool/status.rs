@@ -77,9 +77,35 @@ fn a_pose_for_a_silent_joint_moves_nothing() {
     rig.break_it("3=missing", "joint 3 does not answer");
     let text = failed(&rig.run(&["pose", "120", "90", "80", "_", "_", "_", "_"]), 1);
     assert!(text.contains("joint 3 does not answer"), "{text}");
-    let targets = succeeded(rig.run(&["get", "target-position.1"]));
-    assert_eq!(words(&targets, "46")[2], "90", "nothing was sent");
+    let text = failed(&rig.run(&["set", "wrist-position", "4", "0", "4", "185", "4", "120"]), 1);
+    assert!(text.contains("joint 3 does not answer"), "M7: {text}");
+    let targets = succeeded(rig.run(&["get", "target-position.1", "target-position.2"]));
+    let target = |register: &str| words(&targets, register)[2].to_owned();
+    assert_eq!((target("46"), target("47")), ("90".to_owned(), "90".to_owned()), "nothing was sent");
     succeeded(rig.run(&["pose", "100", "_", "_", "_", "_", "_", "_", "--wait"]));
+}
+
+#[test]
+fn a_pose_that_ends_at_a_blocked_joint_names_the_joints_that_still_move() {
+    let rig = Rig::start();
+    succeeded(rig.run(&["set", "speed", "5"]));
+    rig.0.says(&["fault", "1=stuck"]);
+    let text = failed(&rig.run(&["pose", "120", "130", "_", "30", "_", "_", "_", "--wait"]), 1);
+    assert!(text.contains("joint 1 is blocked"), "{text}");
+    assert!(text.contains("still moving: joints 2 and 4; `sevenbot stop` makes the arm hold"), "{text}");
+    succeeded(rig.run(&["set", "speed", "60"]));
+}
+
+#[test]
+fn d30_a_move_of_an_arm_with_an_alarm_warns() {
+    let rig = Rig::start();
+    rig.0.says(&["trip", "2"]);
+    let overloaded = "a servo was overloaded";
+    wait_until("the arm tells of the alarm", || all_output(&rig.run(&["status"])).contains(overloaded));
+    let output = rig.run(&["home"]);
+    let warned = all_output(&output);
+    succeeded(output);
+    assert!(warned.contains(overloaded) && warned.contains("`sevenbot status` tells what to do"), "{warned}");
 }
 
 #[test]
@@ -94,6 +120,19 @@ fn d27_a_pose_and_a_stream_end_at_a_blocked_joint_and_recover_helps() {
     let text = succeeded(rig.run(&["recover", "--yes"]));
     assert!(text.contains("recovered: the motors hold the arm"), "{text}");
     succeeded(rig.run(&["status"]));
+}
+
+#[test]
+fn a_pose_that_fails_puts_the_speeds_back() {
+    let rig = Rig::start();
+    succeeded(rig.run(&["set", "speed", "20"]));
+    rig.0.says(&["fault", "1=stuck"]);
+    let failing = ["pose", "120", "110", "_", "_", "_", "_", "_", "--wait", "--speed", "5"];
+    let text = failed(&rig.run(&failing), 1);
+    assert!(text.contains("joint 1 is blocked") && text.contains("Still moving: joint 2."), "{text}");
+    let speeds = succeeded(rig.run(&["get", "speed"]));
+    assert_eq!((words(&speeds, "32")[2], words(&speeds, "33")[2]), ("20", "20"));
+    rig.0.says(&["fault", "clear"]);
 }
 
 /// The stream does not run meanwhile. The controller follows a joint that fell and holds it, so only its target tells that it is

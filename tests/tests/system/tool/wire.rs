@@ -9,6 +9,7 @@ use system_tests::frames::reply;
 use system_tests::process::RunningProgram;
 use system_tests::programs::tool;
 use system_tests::registers::{DEVICE_ID, FEEDBACK_FREQUENCY};
+use system_tests::simulator::Simulator;
 use system_tests::{TestSetup, read_request, with_arm, write_request};
 
 #[test]
@@ -26,6 +27,17 @@ fn ports_identifies_arms() {
         assert!(text.contains("\"arm\":{\"device_id\":42,\"firmware\":\"3.0\""), "{text}");
         arm.reopen(115_200);
     });
+}
+
+#[test]
+fn ports_lists_the_simulators_that_run() {
+    let simulator = Simulator::start(&["--arms", "2"]);
+    let mut tool = tool();
+    tool.arg("ports").env("XDG_RUNTIME_DIR", simulator.folder.path()).env_remove("SEVENBOT_PORT");
+    let text = succeeded(tool.output().expect("sevenbot runs"));
+    for port in &simulator.ports {
+        assert!(words(&text, &port.display().to_string()).join(" ").contains("7Bot V2"), "{text}");
+    }
 }
 
 #[test]

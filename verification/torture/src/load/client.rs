@@ -207,7 +207,7 @@ impl LoadClient {
         }
     }
 
-    /// Sends no more requests and waits for the pending replies.
+    /// Stops the reports, and waits for the pending replies.
     pub(super) fn finish(mut self) -> Result<LoadResult, LoadError> {
         self.result.elapsed = self.start.elapsed();
         self.set(FEEDBACK_FREQUENCY.address, &[0])?;

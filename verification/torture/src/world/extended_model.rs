@@ -62,7 +62,7 @@ pub(crate) fn fine_targets(items: &[(u8, u8)]) -> impl Iterator<Item = (Joint, u
     Joint::ALL.into_iter().filter_map(|joint| Some((joint, word(items, fine_target(joint))?)))
 }
 
-/// The angle of a fine target in hundredths of a degree.
+/// Converts a fine target, which is in hundredths of a degree.
 pub(crate) fn angle(hundredths: u16) -> MicroDegrees {
     MicroDegrees(i32::from(hundredths) * 10_000)
 }

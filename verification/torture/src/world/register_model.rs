@@ -146,7 +146,7 @@ impl RegisterModel {
         image
     }
 
-    /// Executes a request. An alarm needs `room` bytes on the link.
+    /// Executes a request. `room` is the number of free bytes on the link: an alarm that does not fit is skipped (M8).
     pub(crate) fn execute(&mut self, request: &HostRequest, room: usize) -> RequestEffect {
         self.outcomes = vec![None];
         match request {

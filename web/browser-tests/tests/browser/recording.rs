@@ -13,7 +13,7 @@ fn record(page: &mut Page, folder: &Path) -> (PathBuf, [f64; 2]) {
     let (start, target) = (page.measured()[0], page.target(1));
     page.focus("#joint-1");
     page.keys("ArrowRight", 40);
-    // The last moment of a recording is that of the last reply before its end.
+    // A recording ends with the last reply before the click: a joint that still moved would be elsewhere then.
     page.wait_until_joint_rests(1, target + 20.0);
     page.click("[data-action=record]");
     let end = page.measured()[0];

@@ -30,7 +30,7 @@ struct StreamScenario {
     loss: f64,
     /// A pause of five periods in the middle, after which the points go on where they stopped.
     pause: bool,
-    /// The host's clock runs faster by this part.
+    /// How much faster the host's clock runs: 200e-6 is 200 ppm.
     drift: f64,
     seconds: f64,
 }

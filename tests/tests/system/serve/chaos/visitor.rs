@@ -203,7 +203,7 @@ impl AddAssign for Tally {
     }
 }
 
-/// Visits the server until the end.
+/// Connects again and again until the chaos is over, and counts visits, replies and refusals.
 pub(crate) fn visit(chaos: &Chaos, way_in: &WayIn, number: u8, seed: u64) -> Tally {
     let mut random = Random::new(seed ^ u64::from(number) << 32);
     let mut tally = Tally::default();

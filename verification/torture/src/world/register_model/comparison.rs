@@ -60,7 +60,7 @@ impl RegisterModel {
             let coarse = u16::from(self.get(TARGET_POSITION.of(joint))) * 100;
             let is_right = match self.targets[joint] {
                 Some(target) => shown == extended_model::hundredths(target),
-                // A half is rounded before it is shown in hundredths.
+                // Both registers show one angle, and the coarse one is rounded to a degree.
                 None => shown <= 18_000 && shown.abs_diff(coarse) <= 50,
             };
             ensure(is_right, || {

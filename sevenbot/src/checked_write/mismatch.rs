@@ -1,0 +1,128 @@
+//! The errors of a verified write: the registers that did not take or keep their values.
+
+use std::fmt;
+
+use protocol_core::registers::map21::find_readable;
+
+use super::cause::MismatchCause;
+use crate::error::Error;
+use crate::names::name_of_register;
+
+/// A register that does not hold what was written to it, or will not keep it: [`MismatchCause::NotStored`].
+///
+/// ```
+/// use sevenbot::checked_write::{MismatchCause, WriteMismatch};
+///
+/// let refused = WriteMismatch { address: 11, wanted: 42, found: 0, cause: MismatchCause::Locked };
+/// assert_eq!(refused.to_string(), "device-id is 0, not 42: it is protected by the EEPROM lock");
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct WriteMismatch {
+    /// The register.
+    pub address: u8,
+    /// The raw value that was written: one byte, or two with the low byte first.
+    pub wanted: u16,
+    /// The raw value that was read back.
+    pub found: u16,
+    /// The reason.
+    pub cause: MismatchCause,
+}
+
+/// Registers that do not hold or keep what was written to them: at least one.
+///
+/// ```
+/// use sevenbot::checked_write::{MismatchCause, NotTaken, WriteMismatch};
+///
+/// let locked = WriteMismatch { address: 11, wanted: 42, found: 0, cause: MismatchCause::Locked };
+/// let error = NotTaken::check(vec![locked]).expect_err("one register differs");
+/// assert_eq!(error.to_string(), "device-id is 0, not 42: it is protected by the EEPROM lock");
+/// assert_eq!(NotTaken::check(Vec::new()), Ok(()));
+/// ```
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{}", reasons(.0))]
+pub struct NotTaken(pub(super) Vec<WriteMismatch>);
+
+impl NotTaken {
+    /// Fails if there is a register that differs.
+    ///
+    /// # Errors
+    /// All these registers.
+    pub fn check(differing: Vec<WriteMismatch>) -> Result<(), Self> {
+        if differing.is_empty() { Ok(()) } else { Err(Self(differing)) }
+    }
+
+    /// The registers, in the order of the writes.
+    #[must_use]
+    pub fn registers(&self) -> &[WriteMismatch] {
+        &self.0
+    }
+
+    /// Is a register protected by the EEPROM lock?
+    #[must_use]
+    pub fn is_locked(&self) -> bool {
+        self.0.iter().any(|register| register.cause == MismatchCause::Locked)
+    }
+}
+
+/// Why a verified write failed.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum WriteError {
+    /// These registers did not take their values.
+    #[error(transparent)]
+    NotTaken(#[from] NotTaken),
+    /// An exchange with the arm failed. The arm may have taken some of the values.
+    #[error(transparent)]
+    Exchange(#[from] Error),
+}
+
+impl WriteError {
+    /// Is it unknown whether the arm carries out the write?
+    #[must_use]
+    pub fn is_uncertain(&self) -> bool {
+        match self {
+            Self::NotTaken(not_taken) => {
+                not_taken.registers().iter().any(|register| register.cause.is_transient())
+            }
+            Self::Exchange(_) => true,
+        }
+    }
+}
+
+/// What is wrong with a setting that is not stored. It may be stored if the storage is full.
+const NOT_STORED: &str = "may be lost when the arm is switched off";
+
+/// The number that a raw value encodes. Minus zero is zero (D9).
+pub(super) fn number(address: u8, raw: u16) -> i32 {
+    find_readable(address).map_or(i32::from(raw), |row| row.range.decode(raw))
+}
+
+/// The reasons, one for all neighbouring registers that share it, each on its own line.
+#[must_use]
+pub fn reasons(unchanged: &[WriteMismatch]) -> String {
+    let groups = unchanged.chunk_by(|one, next| one.cause == next.cause);
+    groups.map(reason).collect::<Vec<String>>().join("\n       ")
+}
+
+/// One reason for all registers that share it.
+fn reason(unchanged: &[WriteMismatch]) -> String {
+    match unchanged {
+        [only] => only.to_string(),
+        [first, .., last] => {
+            let (from, to) = (name_of_register(first.address), name_of_register(last.address));
+            let fault = if first.cause == MismatchCause::NotStored { NOT_STORED } else { "did not change" };
+            format!("{from} to {to} {fault}: {}", first.cause)
+        }
+        [] => String::new(),
+    }
+}
+
+impl fmt::Display for WriteMismatch {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (found, wanted) = (number(self.address, self.found), number(self.address, self.wanted));
+        let (name, cause) = (name_of_register(self.address), self.cause);
+        match cause {
+            MismatchCause::NotStored => write!(out, "{name} is {found}, but {NOT_STORED}: {cause}"),
+            _ => write!(out, "{name} is {found}, not {wanted}: {cause}"),
+        }
+    }
+}
