@@ -87,8 +87,10 @@ impl Arm {
     }
 
     fn held_joints(&mut self, is_fine: bool) -> Result<HeldJoints, Error> {
+        // The status first: a restart after it is noticed.
+        let joints = self.joints()?;
         let fine = is_fine.then(|| self.read_span(HeldJoints::FINE_REGISTERS)).transpose()?;
-        Ok(HeldJoints::new(self.joints()?, fine))
+        Ok(HeldJoints::new(joints, fine))
     }
 }
 
