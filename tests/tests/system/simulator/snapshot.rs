@@ -81,7 +81,10 @@ fn the_settings_of_a_snapshot_reach_their_file() {
 fn what_has_no_snapshots_says_why() {
     let simulator = Simulator::start(&[]);
     let error = simulator.refuses(&["restore", "x"], 1);
-    assert!(error.contains("there is no snapshot 'x'") && error.contains("\"snapshot\""), "{error}");
+    assert!(
+        error.contains("there is no snapshot 'x'") && error.contains("`sevenbot sim snapshot NAME`"),
+        "{error}"
+    );
     simulator.says(&["snapshot", "a"]);
     simulator.says(&["snapshot", "b"]);
     let error = simulator.refuses(&["restore", "x"], 1);
