@@ -172,31 +172,39 @@ impl Joints {
         if answer.torque.is_some_and(|held| held.is_on) {
             self.supply.has_torque();
         }
-        if self.supply.is_undecided(now) && self.set_of(|state| state.drive.has_set_point()) == 0 {
+        if self.supply.is_undecided(now) && self.driven() == 0 {
             self.supply.none_driven();
         }
         let may_engage = may_engage && !self.supply.is_undecided(now);
         let Some(state) = self.joint_mut(joint) else { return Measured::Rejected };
+        let was_driven = state.drive.has_set_point();
         let outcome = state.read(now, answer, may_engage, registers);
-        if state.drive.has_set_point() {
+        if was_driven || state.drive.has_set_point() {
             self.supply.answered(now);
         }
         match outcome {
-            Measured::TorqueLost => self.torque_lost(now, joint),
+            // An alarm from before an emergency stop may tell it before the torque switch does.
+            Measured::Freed | Measured::TorqueLost if self.is_supply_lost(joint) => Measured::SupplyLost,
+            Measured::TorqueLost => {
+                self.joint_mut(joint).into_iter().for_each(|state| state.lose_torque(now));
+                Measured::ServoChanged
+            }
             Measured::TurnedPast => self.catch_up(joint, registers),
             _ => outcome,
         }
     }
 
-    /// Decides what it means that the servo of a driven joint has no torque ([D28](protocol_core::decisions#d28),
-    /// [D29](protocol_core::decisions#d29)).
-    fn torque_lost(&mut self, now: Instant, joint: Joint) -> Measured {
-        let driven = self.set_of(|state| state.drive.has_set_point());
-        if self.supply.is_lost(driven & !joint.bit() != 0) {
-            return Measured::SupplyLost;
-        }
-        self.joint_mut(joint).into_iter().for_each(|state| state.lose_torque(now));
-        Measured::ServoChanged
+    /// Was the supply lost, now that the servo of this joint was found without torque ([D28](protocol_core::decisions#d28),
+    /// [D29](protocol_core::decisions#d29))?
+    fn is_supply_lost(&mut self, joint: Joint) -> bool {
+        let others = self.driven() & !joint.bit();
+        self.supply.is_lost(others != 0)
+    }
+
+    /// The joints with a set-point.
+    #[inline(never)]
+    fn driven(&self) -> u8 {
+        self.set_of(|state| state.drive.has_set_point())
     }
 
     /// Records that a servo did not answer. Returns whether it counts as silent from now on.

@@ -1,6 +1,7 @@
 //! The servos lose their supply, or their bus (D29).
 
 use crate::rig::{Rig, ToServos};
+use arm_sim::servo::Trip;
 use motion_core::servo_bus::Torque;
 use protocol_core::registers::Joint;
 use protocol_core::time::Instant;
@@ -79,4 +80,23 @@ fn d29_an_adapter_that_was_gone_is_no_lost_supply() {
     rig.write(46, &[100]);
     rig.run_ms(1_000);
     assert_eq!(rig.present()[0], 100);
+}
+
+#[test]
+fn d29_a_servo_that_was_hot_before_an_emergency_stop_hides_it_not() {
+    // The joint is turned meanwhile, so its alarm tells with the first answer that nothing holds it. At some of these times it
+    // answers last.
+    for (number, millis) in
+        (3_000..3_100).step_by(3).flat_map(|millis| (1..=7).map(move |number| (number, millis)))
+    {
+        let mut rig = Rig::started();
+        rig.plant.trip(joint(number), Trip::Heat);
+        rig.run_ms(30);
+        rig.plant.power_off(Instant::from_micros(rig.now_us));
+        rig.run_ms(millis);
+        rig.plant.move_by_hand(joint(number), rig.plant.position_counts(joint(number)) - 60);
+        rig.plant.power_cycle(Instant::from_micros(rig.now_us));
+        rig.run_ms(2_000);
+        assert_eq!((rig.get(SUPPLY_LOST), rig.get(29)), (1, 0), "joint {number}, after {millis} ms");
+    }
 }

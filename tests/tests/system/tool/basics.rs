@@ -2,7 +2,7 @@
 
 use std::io::Read;
 
-use super::output::{all_output, failed, run_without_arm, succeeded, words};
+use super::output::{all_output, failed, run_without_arm, stored, succeeded, words};
 use system_tests::registers::{
     DEVICE_ID, EEPROM_LOCK, EFFECTOR_TYPE, FEEDBACK_FREQUENCY, MOTOR_STATE, OFFSET, SPEED, STANDARD_POSE,
     TARGET_POSITION, TIME,
@@ -74,7 +74,7 @@ fn set_reports_the_lock_and_opens_it_on_request() {
         let text = failed(&arm.sevenbot(&["set", "offset.2", "-5"]), 1);
         assert!(text.contains("EEPROM lock") && text.contains("--unlock"), "{text}");
         assert_eq!(arm.register(OFFSET + 1), 0);
-        let text = succeeded(arm.sevenbot(&["set", "--unlock", "offset.2", "-5"]));
+        let text = stored(arm, &["set", "--unlock", "offset.2", "-5"]);
         assert_eq!(words(&text, "14"), ["14", "offset.2", "-5", "°"]);
         assert_eq!(arm.register(OFFSET + 1), 0x85);
         assert_eq!(arm.register(EEPROM_LOCK), 1, "closed again");

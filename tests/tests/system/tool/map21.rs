@@ -3,7 +3,7 @@
 
 use std::fs::{self, File};
 
-use super::output::{failed, succeeded, words};
+use super::output::{failed, stored, succeeded, words};
 use system_tests::registers::{EEPROM_LOCK, LAST_REFUSAL, OFFSET, STANDARD_POSE, TARGET_POSITION};
 use system_tests::{TestArm, TestSetup, with_arm};
 
@@ -25,24 +25,24 @@ fn options_are_a_setting_like_any_other() {
         let file = path.to_str().expect("UTF-8");
         let locked = failed(&arm.sevenbot(&["set", "options", "2"]), 1);
         assert!(locked.contains("options is 0, not 2: it is protected by the EEPROM lock"), "{locked}");
-        succeeded(arm.sevenbot(&["set", "--unlock", "offset.2", "-5"]));
-        let shown = succeeded(arm.sevenbot(&["set", "--unlock", "options", "2"]));
+        stored(arm, &["set", "--unlock", "offset.2", "-5"]);
+        let shown = stored(arm, &["set", "--unlock", "options", "2"]);
         assert_eq!(words(&shown, "20"), ["20", "options", "2", "alarm", "frames"]);
         assert_eq!((arm.register(OPTIONS), arm.register(EEPROM_LOCK)), (2, 1));
         succeeded(arm.sevenbot(&["backup", file]));
         let text = fs::read_to_string(&path).expect("a file");
         assert!(text.contains("offset = [0, -5, 0, 0, 0, 0, 0]\noptions = 2\n"), "{text}");
 
-        succeeded(arm.sevenbot(&["set", "--unlock", "11..20", "0"]));
+        stored(arm, &["set", "--unlock", "11..20", "0"]);
         assert_eq!((arm.read(OFFSET, 7), arm.register(OPTIONS)), (vec![0; 7], 0));
-        let changes = succeeded(arm.sevenbot(&["restore", "--yes", file]));
+        let changes = stored(arm, &["restore", "--yes", file]);
         assert_eq!(words(&changes, "options"), ["options", "none", "->", "alarm", "frames"]);
         assert_eq!(arm.read(OFFSET, 8), [0, 0x85, 0, 0, 0, 0, 0, 2]);
         // A file from before this setting.
         fs::write(&path, text.replace("options = 2\n", "").replace("-5", "3")).expect("a file");
-        succeeded(arm.sevenbot(&["restore", "--yes", file]));
+        stored(arm, &["restore", "--yes", file]);
         assert_eq!(arm.read(OFFSET, 8), [0, 3, 0, 0, 0, 0, 0, 2], "a missing setting keeps its value");
-        succeeded(arm.sevenbot(&["set", "--unlock", "11..20", "0"]));
+        stored(arm, &["set", "--unlock", "11..20", "0"]);
     });
 }
 
@@ -55,13 +55,13 @@ fn a_write_of_map_21_leaves_reports_and_offsets_as_they_were() {
         assert_eq!(arm.read(OFFSET, 2), [0, 0x85], "in the encoding of map 2.2");
         succeeded(arm.sevenbot(&["set", "feedback-frequency", "20"]));
         succeeded(arm.sevenbot(&["set", "button-enable", "1"]));
-        succeeded(arm.sevenbot(&["set", "--unlock", "options", "1"]));
+        stored(arm, &["set", "--unlock", "options", "1"]);
         let shown = succeeded(arm.sevenbot(&["get", "53", "66", "20"]));
         assert_eq!(words(&shown, "53")[2], "20", "the reports go on");
         assert_eq!((words(&shown, "66")[2], words(&shown, "20")[2]), ("1", "1"));
         // Reports of map 2.1 are asked for, so those of map 2.2 end (M4).
         succeeded(arm.sevenbot(&["set", "angle-feedback-frequency", "10"]));
-        succeeded(arm.sevenbot(&["set", "--unlock", "options", "0"]));
+        stored(arm, &["set", "--unlock", "options", "0"]);
         let shown = succeeded(arm.sevenbot(&["get", "53", "82"]));
         assert_eq!((words(&shown, "53")[2], words(&shown, "82")[2]), ("0", "10"));
         succeeded(arm.sevenbot(&["set", "82", "0"]));
@@ -87,7 +87,7 @@ fn registers_of_map_21_are_known_by_name() {
         let range = failed(&arm.sevenbot(&["set", "load-feedback-frequency", "101"]), 2);
         assert!(range.contains("load-feedback-frequency takes 0 to 100"), "{range}");
         // The same in map 2.1, which needs no other function.
-        succeeded(arm.sevenbot(&["--map", "2.1", "set", "--unlock", "options", "0"]));
+        stored(arm, &["--map", "2.1", "set", "--unlock", "options", "0"]);
         arm.drive_to(&STANDARD_POSE);
     });
 }

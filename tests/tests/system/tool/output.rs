@@ -2,13 +2,33 @@
 
 use std::process::Output;
 
+use system_tests::TestArm;
 use system_tests::programs::tool;
+use system_tests::registers::FAULTS;
+
+/// The fault bit of the settings storage.
+const SETTINGS_STORAGE: u8 = 1 << 0;
 
 /// The standard output of a command that succeeded.
 #[track_caller]
 pub(crate) fn succeeded(output: Output) -> String {
     assert_eq!(output.status.code(), Some(0), "{}", all_output(&output));
     String::from_utf8(output.stdout).expect("text")
+}
+
+/// The output of a command that wrote settings. An arm in the emulator has no storage for them, and the command has to say so.
+#[track_caller]
+pub(crate) fn stored(arm: &mut TestArm, arguments: &[&str]) -> String {
+    let output = arm.sevenbot(arguments);
+    if arm.register(FAULTS) & SETTINGS_STORAGE == 0 {
+        return succeeded(output);
+    }
+    let text = failed(&output, 1);
+    assert!(
+        text.contains("may be lost when the arm is switched off: the settings storage has a fault"),
+        "{text}"
+    );
+    text
 }
 
 /// The whole output of a command that ended with this status.
