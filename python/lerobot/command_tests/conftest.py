@@ -144,7 +144,7 @@ class EmulatedArm:
 def emulated_arm(tmp_path: Path) -> Iterator[EmulatedArm]:
     """`cargo xtask emulate`."""
     arm = EmulatedArm(tmp_path / "arm", tmp_path / "angles.csv")
-    options = ["--no-build", "--link", arm.port, "--angles", arm.angles]
+    options: list[str | Path] = ["--no-build", "--link", arm.port, "--angles", arm.angles]
     emulator = subprocess.Popen([os.environ["XTASK"], "emulate", *options])
     try:
         deadline = time.monotonic() + START_UP
