@@ -17,6 +17,7 @@ use host_link::{Snapshot, Span};
 
 /// The layout of the extended block that this library knows.
 pub(crate) const KNOWN_LAYOUT: u8 = 1;
+/// What tells a stream from one that its program has ended.
 const PERIOD_AND_WATCHDOG: Span = Span::between(&SET_POINT_PERIOD, &HOST_WATCHDOG);
 
 impl Arm {

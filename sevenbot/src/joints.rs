@@ -51,6 +51,17 @@ pub enum StepBaseError {
     },
 }
 
+/// These joints, as [`Joint::bit`]s.
+pub(crate) fn bits(joints: impl IntoIterator<Item = Joint>) -> u8 {
+    joints.into_iter().fold(0, |bits, joint| bits | joint.bit())
+}
+
+/// The joints with a target, as [`Joint::bit`]s.
+pub(crate) fn joints_of<T>(targets: &[Option<T>; 7]) -> u8 {
+    let joints = Joint::ALL.into_iter().zip(targets).filter(|(_, target)| target.is_some());
+    bits(joints.map(|(joint, _)| joint))
+}
+
 impl Arm {
     /// The joints at this instant.
     ///

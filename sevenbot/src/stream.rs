@@ -11,7 +11,6 @@
 
 use std::time::Duration;
 
-use protocol_core::registers::Joint;
 use protocol_core::registers::map::{
     FEEDBACK_FREQUENCY, FINE_TARGET, HOST_WATCHDOG, REPORT_CONTENT, SET_POINT_PERIOD, SPEED, WATCHDOG_ACTION,
     fault,
@@ -23,6 +22,7 @@ use crate::error::Error;
 use crate::fine::fine_frames;
 use crate::fine_state::FineTargets;
 use crate::health::{MoveCheck, MoveCheckError, MoveState};
+use crate::joints::joints_of;
 use crate::units::Speed;
 use host_link::Span;
 
@@ -33,7 +33,7 @@ pub use latest::{LatestCounts, LatestPoints, LatestStep};
 pub use pace::{PaceCounts, StreamPace};
 
 /// The registers that a stream sets: period, time of the watchdog, action of the watchdog.
-pub(crate) const STREAM_REGISTERS: Span = Span::between(&SET_POINT_PERIOD, &WATCHDOG_ACTION);
+const STREAM_REGISTERS: Span = Span::between(&SET_POINT_PERIOD, &WATCHDOG_ACTION);
 /// No stream, no watchdog.
 const SWITCHED_OFF: [u8; 4] = [0; 4];
 /// The unit of the watchdog's time.
@@ -195,8 +195,7 @@ impl<'a> SetPointStream<'a> {
             self.arm.write(address, &values)?;
             self.last_sent = self.arm.elapsed();
         }
-        let joints = Joint::ALL.into_iter().zip(point).filter(|(_, angle)| angle.is_some());
-        self.check.add_joints(joints.fold(0, |bits, (joint, _)| bits | joint.bit()), self.arm);
+        self.check.add_joints(joints_of(point), self.arm);
         Ok(())
     }
 

@@ -16,17 +16,14 @@ use protocol_core::registers::map::{
 };
 use protocol_core::registers::{JOINTS, Joint, Register};
 
-use super::held_targets::{HeldTargets, Targets};
+use super::angles::{Angles, DEGREE, UNMEASURED, angles_in, limits_in};
+use super::held_targets::HeldTargets;
 
 /// Reads and writes are repeated this often.
 const MOST_ROUNDS: u8 = 5;
 /// A hold is repeated this often until each joint whose set-point moves was measured: for 0.2 s or more. It takes
 /// 0.2 s after power-up.
 const MOST_REPEATS: u8 = 40;
-/// The value of a fine position that was not measured.
-const UNMEASURED: u16 = u16::MAX;
-/// Hundredths of a degree in a register of one byte.
-const DEGREE: u16 = 100;
 
 /// A frame to write: the first register, and the values.
 pub(crate) type Frame = (u8, Vec<u8>);
@@ -95,7 +92,7 @@ impl ArmHold {
     }
 
     /// A client holds the joints that have a target here: what was read of them before is out of date.
-    pub(crate) fn note_held(&mut self, targets: &Targets) {
+    pub(crate) fn note_held(&mut self, targets: &Angles) {
         let held = Joint::ALL.into_iter().zip(targets).filter(|(_, target)| target.is_some());
         self.held_meanwhile = held.fold(self.held_meanwhile, |bits, (joint, _)| bits | joint.bit());
     }
@@ -155,11 +152,10 @@ impl ArmHold {
             self.is_done = true;
             return Vec::new();
         }
-        let is_unmeasured = |joint: Joint| {
-            let position = self.value(values, address, self.rows().1.of(joint));
-            self.driven & joint.bit() != 0 && position == Some(UNMEASURED)
-        };
-        self.has_unmeasured = Joint::ALL.into_iter().any(is_unmeasured);
+        let mut positions = Joint::ALL.into_iter().zip(angles_in(self.rows().1, address, values));
+        let is_unmeasured =
+            |(joint, at): (Joint, _)| self.driven & joint.bit() != 0 && at == Some(UNMEASURED);
+        self.has_unmeasured = positions.any(is_unmeasured);
         self.sent = self.frames_that_hold(moving, address, values, held);
         self.is_done = self.sent.is_empty();
         self.sent.clone()
@@ -168,10 +164,12 @@ impl ArmHold {
     /// One frame for each row of joints that get a target.
     fn frames_that_hold(&self, moving: u8, address: u8, values: &[u8], held: &HeldTargets) -> Vec<Frame> {
         let (targets, positions) = self.rows();
-        let present = Joint::ALL.map(|joint| self.value(values, address, targets.of(joint)));
+        let [present, measured] = [targets, positions].map(|row| angles_in(row, address, values));
         let mut wanted = [None; JOINTS];
-        for ((wanted, target), joint) in wanted.iter_mut().zip(present).zip(Joint::ALL) {
-            let position = self.value(values, address, positions.of(joint)).filter(|&at| at != UNMEASURED);
+        for (((wanted, target), position), joint) in
+            wanted.iter_mut().zip(present).zip(measured).zip(Joint::ALL)
+        {
+            let position = position.filter(|&at| at != UNMEASURED);
             let kept = match moving & joint.bit() {
                 0 => target,
                 _ => position.and_then(|position| self.held_target(joint, position, target, held)),
@@ -179,11 +177,8 @@ impl ArmHold {
             // The points of a stream that are ahead would move a joint which keeps its target.
             *wanted = kept.map_or(position, |kept| self.is_streaming.then_some(kept));
         }
-        if self.is_fine {
-            let limits = values.get(usize::from(LIMITS.address.saturating_sub(address))).copied();
-            let present = present.map(Option::unwrap_or_default);
-            keep_limits(limits.unwrap_or_default(), &present, &mut wanted);
-        }
+        let present = present.map(Option::unwrap_or_default);
+        keep_limits(limits_in(address, values), &present, &mut wanted);
         let mut frames: Vec<Frame> = Vec::new();
         for (joint, wanted) in Joint::ALL.into_iter().zip(wanted) {
             let Some(bytes) = wanted.map(|wanted| self.bytes(wanted)) else { continue };
@@ -205,16 +200,7 @@ impl ArmHold {
         held.near(joint, position).filter(|&target| is_newer || Some(target) == read)
     }
 
-    /// A register of a joint in the values from `address` on, in hundredths of a degree.
-    fn value(&self, values: &[u8], address: u8, register: u8) -> Option<u16> {
-        let bytes = values.get(usize::from(register.checked_sub(address)?)..)?;
-        match self.is_fine {
-            true => bytes.first_chunk().map(|&word| u16::from_le_bytes(word)),
-            false => bytes.first().map(|&degrees| DEGREE * u16::from(degrees)),
-        }
-    }
-
-    /// The bytes of such a register.
+    /// The bytes of a target in hundredths of a degree.
     fn bytes(&self, value: u16) -> Vec<u8> {
         match self.is_fine {
             true => value.to_le_bytes().to_vec(),

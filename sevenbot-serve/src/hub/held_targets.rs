@@ -3,24 +3,22 @@
 //! A joint that was stopped brakes past its target and returns to it. The server must not hold it again where it is measured
 //! meanwhile: the arm would rest elsewhere than where a stop was confirmed.
 
-use protocol_core::registers::{JOINTS, Joint};
+use protocol_core::registers::Joint;
 
+use super::angles::Angles;
 use super::intent::Intent;
 
 /// A joint may be so far from the target that holds it, in hundredths of a degree. One that is farther away is not braking: the
 /// program that held it read its position long before.
 const LONGEST_BRAKING: u16 = 1_500;
 
-/// One target for each joint, in hundredths of a degree; `None`: it does not hold.
-pub(crate) type Targets = [Option<u16>; JOINTS];
-
-/// The targets that hold joints.
+/// The targets that hold joints; `None`: the joint does not hold.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct HeldTargets(Targets);
+pub(crate) struct HeldTargets(Angles);
 
 impl HeldTargets {
     /// A write with this intent and these targets goes to the arm.
-    pub(crate) fn note_write(&mut self, intent: Intent, targets: &Targets) {
+    pub(crate) fn note_write(&mut self, intent: Intent, targets: &Angles) {
         match intent {
             Intent::Setting => {}
             Intent::Hold | Intent::Stop => {

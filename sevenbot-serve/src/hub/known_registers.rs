@@ -11,7 +11,7 @@ use protocol_core::registers::map::{
 use protocol_core::registers::map21::{OPTIONS, option};
 use protocol_core::registers::{Accepted, Joint, Map, RegisterFile};
 
-use super::held_targets::Targets;
+use super::angles::Angles;
 
 /// The registers of the arm that the hub knows.
 #[derive(Debug)]
@@ -72,8 +72,8 @@ impl KnownRegisters {
     }
 
     /// The targets in a write that the arm accepts, in hundredths of a degree.
-    pub(crate) fn targets_in(&self, map: Map, address: u8, values: &[u8]) -> Targets {
-        let Some(accepted) = self.check(map, address, values) else { return Targets::default() };
+    pub(crate) fn targets_in(&self, map: Map, address: u8, values: &[u8]) -> Angles {
+        let Some(accepted) = self.check(map, address, values) else { return Angles::default() };
         Joint::ALL.map(|joint| {
             let degrees = accepted.value_at(TARGET_POSITION.of(joint));
             let fine = || accepted.word_at(FINE_TARGET.of(joint));

@@ -15,6 +15,7 @@
 //! * A stop goes before everything else, and ends what the other clients stream (`drive`, `intent`).
 
 mod admission;
+mod angles;
 mod arm_hold;
 mod client;
 mod client_id;

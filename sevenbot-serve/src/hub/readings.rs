@@ -6,16 +6,16 @@ use std::collections::VecDeque;
 
 use host_link::keep_limits;
 use host_link::sharing::DROOP;
-use protocol_core::registers::map::{FINE_POSITION, FINE_TARGET, LIMITS, PRESENT_POSITION, TARGET_POSITION};
-use protocol_core::registers::{JOINTS, Joint, Register};
+use protocol_core::registers::map::{FINE_POSITION, FINE_TARGET, PRESENT_POSITION, TARGET_POSITION};
+use protocol_core::registers::{JOINTS, Register};
 use protocol_core::time::{Duration, Instant};
+
+use super::angles::{UNMEASURED, angles_in, limits_in};
 
 /// A client may ask again before it writes what it read, so some readings are kept.
 const KEPT: usize = 8;
 /// Older readings tell nothing about where the arm is.
 const FRESH: Duration = Duration::from_millis(1_000);
-/// The value of a fine position that was not measured.
-const UNMEASURED: u16 = u16::MAX;
 
 /// A reply or a report that holds positions.
 #[derive(Debug)]
@@ -32,8 +32,7 @@ pub(crate) struct Readings(VecDeque<Reading>);
 impl Readings {
     /// The client got these values.
     pub(crate) fn note(&mut self, now: Instant, address: u8, values: &[u8]) {
-        let holds =
-            |row: &Register| Joint::ALL.into_iter().any(|joint| bytes(row, joint, address, values).is_some());
+        let holds = |row| angles_in(row, address, values).iter().any(Option::is_some);
         if !holds(&PRESENT_POSITION) && !holds(&FINE_POSITION) {
             return;
         }
@@ -58,42 +57,26 @@ impl Reading {
     /// The number of joints whose target in the write is the position of this reading; `None` if one is not. A joint may also keep
     /// the target of this reading, and targets stay within the limits of the arm, as far as the reading has them.
     fn held(&self, targets: &Register, positions: &Register, address: u8, values: &[u8]) -> Option<usize> {
-        let written = Joint::ALL.map(|joint| value(targets, joint, address, values));
-        let present = Joint::ALL.map(|joint| value(targets, joint, self.address, &self.values));
+        let written = angles_in(targets, address, values);
+        let [present, measured] = [targets, positions].map(|row| angles_in(row, self.address, &self.values));
+        let is_fine = positions == &FINE_POSITION;
         let mut held = [None; JOINTS];
-        for (((held, joint), target), present) in held.iter_mut().zip(Joint::ALL).zip(written).zip(present) {
+        for (((held, target), present), position) in held.iter_mut().zip(written).zip(present).zip(measured) {
             let Some(target) = target else { continue };
-            let position = value(positions, joint, self.address, &self.values)?;
-            let is_kept =
-                positions == &FINE_POSITION && present == Some(target) && target.abs_diff(position) <= DROOP;
+            let position = position?;
+            let is_kept = is_fine && present == Some(target) && target.abs_diff(position) <= DROOP;
             *held = Some(if is_kept { target } else { position }).filter(|&held| held != UNMEASURED);
         }
-        if positions == &FINE_POSITION {
-            let limits =
-                LIMITS.address.checked_sub(self.address).and_then(|at| self.values.get(usize::from(at)));
-            keep_limits(limits.copied().unwrap_or(0), &present.map(Option::unwrap_or_default), &mut held);
-        }
+        let limits = if is_fine { limits_in(self.address, &self.values) } else { 0 };
+        keep_limits(limits, &present.map(Option::unwrap_or_default), &mut held);
         (held == written).then(|| written.into_iter().flatten().count())
     }
-}
-
-/// The value of a joint's register in the values from `address` on.
-fn value(row: &Register, joint: Joint, address: u8, values: &[u8]) -> Option<u16> {
-    match bytes(row, joint, address, values)? {
-        &[low, high] => Some(u16::from_le_bytes([low, high])),
-        bytes => bytes.first().copied().map(u16::from),
-    }
-}
-
-/// The bytes of a joint's register in the values from `address` on.
-fn bytes<'a>(row: &Register, joint: Joint, address: u8, values: &'a [u8]) -> Option<&'a [u8]> {
-    let start = usize::from(row.of(joint).checked_sub(address)?);
-    values.get(start..start + usize::from(row.range.width()))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use protocol_core::registers::map::LIMITS;
 
     const POSE: [u8; 7] = [10, 20, 30, 40, 50, 60, 70];
 
@@ -133,6 +116,7 @@ mod tests {
         assert_eq!(held(&reading(8_900), 8_950), None, "neither of them");
         assert_eq!(held(&reading(8_800), 9_000), None, "it is on its way");
     }
+
     #[test]
     fn d25_a_stop_within_the_limits_is_a_stop() {
         let mut readings = Readings::default();

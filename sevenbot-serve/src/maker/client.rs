@@ -144,7 +144,6 @@ impl MakerClient {
                 None => (self.first, self.current) = (Some(event), Some(command)),
                 Some(before) => self.answer(false, &solution(&before, &event)),
             },
-
             (Some(_), Event::Reply { values, .. }) => {
                 self.answer(true, &json!({"status": "ok", "data": values}))
             }

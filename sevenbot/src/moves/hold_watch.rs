@@ -14,7 +14,7 @@ use protocol_core::registers::map::{MOTOR_STATE, motor_state};
 use super::error::MoveError;
 use crate::arm::Arm;
 use crate::health::{MoveCheck, Problem, ProblemKind};
-use crate::joints::JointSnapshot;
+use crate::joints::{JointSnapshot, bits};
 
 /// The arm notices a servo that let go after at most 200 ms (D28), and a silent one sooner.
 const WATCH_TIME: Duration = Duration::from_millis(500);
@@ -86,8 +86,7 @@ impl Arm {
     /// another program wrote a target, or an exchange failed. [`MoveError::NotHeld`] if a joint is further than 10 degrees from its
     /// target at the end, and further than at the start.
     pub fn watch_hold(&mut self) -> Result<(), MoveError> {
-        let all = Joint::ALL.into_iter().fold(0, |bits, joint| bits | joint.bit());
-        let mut check = MoveCheck::begin(self, all)?;
+        let mut check = MoveCheck::begin(self, bits(Joint::ALL))?;
         let begun = self.joints()?;
         let end = self.now() + WATCH_TIME;
         loop {
@@ -130,46 +129,4 @@ fn check_held(begun: &JointSnapshot, now: &JointSnapshot) -> Result<(), MoveErro
 
 fn restarted() -> MoveError {
     MoveError::Problems(vec![Problem::of_arm(ProblemKind::Restarted)])
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::simulated::{self, SimulationConfig};
-
-    #[test]
-    fn without_supply_nothing_is_written_so_that_the_motors_stay_off_when_it_comes_back() {
-        let (mut arm, simulation) = simulated::arm(SimulationConfig::default()).expect("an arm");
-        arm.driven_joints().expect("it is driven");
-        arm.write_motion(MOTOR_STATE.address, &[motor_state::DAMPING]).expect("a write");
-        simulation.with(|arm| arm.set_fault("supply=off".parse().expect("a fault"), None));
-        arm.sleep(Duration::from_secs(2));
-        let none = Err(MoveError::Problems(vec![Problem::of_arm(ProblemKind::NoServoAnswers)]));
-        assert_eq!(arm.engage_and_watch(), none);
-        // With the effector, register 30, in the same frame.
-        assert_eq!(arm.set_registers(MOTOR_STATE.address, &[motor_state::SERVO, 0], false), none);
-        simulation.with(|arm| drop(arm.end_faults(None)));
-        arm.sleep(Duration::from_secs(2));
-        assert_eq!(arm.joints().map(|joints| joints.motor_state()), Ok(motor_state::DAMPING));
-        assert_eq!(arm.engage_and_watch(), Ok(()));
-    }
-
-    #[test]
-    fn a_joint_that_is_dragged_away_does_not_hold() -> Result<(), Box<dyn std::error::Error>> {
-        let (hold, engage) = (|arm: &mut Arm| arm.hold_and_watch().map(drop), Arm::engage_and_watch);
-        for (push, holds) in [("2=push=-300", true), ("2=push=-3000", false)] {
-            for watch in [hold as fn(&mut Arm) -> Result<(), MoveError>, engage] {
-                let (mut arm, simulation) = simulated::arm(SimulationConfig::default())?;
-                arm.driven_joints()?;
-                let fault = push.parse()?;
-                simulation.with(|arm| arm.set_fault(fault, None));
-                arm.sleep(Duration::from_millis(200));
-                let held = watch(&mut arm);
-                let text = held.as_ref().err().map(ToString::to_string).unwrap_or_default();
-                assert_eq!(held.is_ok(), holds, "{push}: {text}");
-                assert!(holds || text.starts_with("the arm does not hold: joint 2 is at 0°, not "), "{text}");
-            }
-        }
-        Ok(())
-    }
 }

@@ -15,7 +15,7 @@ use crate::arm::Arm;
 use crate::error::Error;
 use crate::fine_state::FineTargets;
 use crate::health::{MoveCheck, MoveCheckError, MoveState, Problem, ProblemKind};
-use crate::joints::{JointSnapshot, frames_for};
+use crate::joints::{JointSnapshot, bits, frames_for, joints_of};
 use crate::units::{MoveTime, Speed, move_duration};
 use host_link::{Snapshot, Span};
 
@@ -304,17 +304,6 @@ impl JointMove {
     }
 }
 
-/// The joints with a target, as [`Joint::bit`]s.
-fn joints_of<T>(targets: &[Option<T>; 7]) -> u8 {
-    let joints = Joint::ALL.into_iter().zip(targets).filter(|(_, goal)| goal.is_some());
-    bits(joints.map(|(joint, _)| joint))
-}
-
-/// These joints, as [`Joint::bit`]s.
-fn bits(joints: impl Iterator<Item = Joint>) -> u8 {
-    joints.fold(0, |bits, joint| bits | joint.bit())
-}
-
 /// Waits for the time between two reads.
 fn pause(arm: &mut Arm, observer: &mut dyn Observer) -> Result<(), MoveError> {
     if !observer.goes_on() {
@@ -326,35 +315,4 @@ fn pause(arm: &mut Arm, observer: &mut dyn Observer) -> Result<(), MoveError> {
 
 fn positions(arm: &mut Arm) -> Result<[u8; 7], Error> {
     Ok(arm.read_span(Span::of(&PRESENT_POSITION))?.joints(&PRESENT_POSITION))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::fine_angle::FineAngle;
-    use crate::simulated::{self, SimulationConfig};
-    use protocol_core::registers::map::{LIMITS, limit};
-
-    #[test]
-    fn a_move_that_is_refused_leaves_the_speeds_and_durations() {
-        let (mut arm, simulation) = simulated::arm(SimulationConfig::default()).expect("an arm");
-        arm.driven_joints().expect("it is driven");
-        arm.write_all_checked(&[(SPEED.address, vec![30; 7]), (LIMITS.address, vec![limit::LINKAGE])])
-            .expect("taken");
-        let base = [FineAngle::from_degrees(100.0), None, None, None, None, None, None];
-        // Against the limit of the linkage.
-        let folded =
-            [None, FineAngle::from_degrees(0.0), FineAngle::from_degrees(0.0), None, None, None, None];
-        let in_half_a_second = Pace { speed: None, time: MoveTime::from_steps(5) };
-        let refused = |arm: &mut Arm, targets| {
-            let error = JointMove::begin_at_pace(arm, targets, in_half_a_second).expect_err("refused");
-            let pace = arm.read(SPEED.address, 14).expect("an answer");
-            assert_eq!(pace, [[30; 7], [0; 7]].concat(), "{error}");
-            error
-        };
-        assert!(matches!(refused(&mut arm, folded), MoveError::NotTaken(_)));
-        simulation.with(|arm| arm.set_fault("1=missing".parse().expect("a fault"), None));
-        arm.sleep(Duration::from_secs(1));
-        assert!(matches!(refused(&mut arm, base), MoveError::Problems(_)));
-    }
 }

@@ -31,3 +31,6 @@ pub use park::{PARK_POSE, ParkError, park_way};
 pub use player::Player;
 pub use recorder::{RecordedPose, Recorder};
 pub use tip_move::{GuardedMoveError, LineStart, LineStartError, TipMove};
+
+#[cfg(test)]
+mod tests;

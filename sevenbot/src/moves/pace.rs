@@ -7,10 +7,9 @@ use super::observer::Observer;
 use crate::arm::Arm;
 use crate::error::Error;
 use crate::fine_state::FineTargets;
-use crate::joints::frames_for;
+use crate::joints::{frames_for, joints_of};
 use crate::units::{MoveTime, Speed};
 use host_link::{Snapshot, Span};
-use protocol_core::registers::Joint;
 use protocol_core::registers::map::{BLOCKED_JOINTS, MISSING_SERVOS, MOVING_JOINTS, SPEED, TIME};
 
 /// Time between two reads of an arm that comes to rest.
@@ -62,8 +61,7 @@ impl PaceBefore {
     /// As [`Arm::read`].
     pub fn read(arm: &mut Arm, targets: &FineTargets) -> Result<Self, Error> {
         let registers = arm.read_span(Span::between(&SPEED, &TIME))?;
-        let joints = Joint::ALL.into_iter().zip(targets).filter(|(_, target)| target.is_some());
-        Ok(Self { registers, joints: joints.fold(0, |bits, (joint, _)| bits | joint.bit()) })
+        Ok(Self { registers, joints: joints_of(targets) })
     }
 
     /// The joints of the move whose set-point still moves, as [`Joint::bit`]s. None from firmware that does not tell it, and no
@@ -119,29 +117,5 @@ impl PaceBefore {
     /// As [`Self::put_back`], also while a joint moves.
     pub(super) fn put_back_at_once(&self, arm: &mut Arm) -> Result<(), MoveError> {
         Ok(arm.put_back(&self.registers)?)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::super::JointMove;
-    use super::*;
-    use crate::fine_angle::FineAngle;
-    use crate::simulated::{self, SimulationConfig};
-
-    #[test]
-    fn after_a_failed_move_the_speeds_are_put_back_when_the_other_joints_rest() {
-        let (mut arm, simulation) = simulated::arm(SimulationConfig::default()).expect("an arm");
-        arm.driven_joints().expect("it is driven");
-        simulation.with(|arm| arm.set_fault("1=stuck".parse().expect("a fault"), None));
-        let targets = [120.0, 130.0, 65.0, 90.0, 90.0, 90.0, 80.0].map(FineAngle::from_degrees);
-        let before = PaceBefore::read(&mut arm, &targets).expect("an answer");
-        let slowly = Pace { speed: Speed::from_steps(5), time: None };
-        let begun = JointMove::begin_at_pace(&mut arm, targets, slowly).expect("taken");
-        assert!(matches!(begun.finish(&mut arm, &mut ()), Err(MoveError::Problems(_))), "joint 1 is blocked");
-        assert!(matches!(before.put_back(&mut arm), Err(MoveError::StillMoving { bits: 0b10, .. })));
-        assert_eq!(before.wait_for_rest(&mut arm, &mut ()), Ok(()));
-        assert_eq!(before.put_back(&mut arm), Ok(()));
-        assert_eq!(arm.read(SPEED.address, 7), Ok(SPEED.default_bytes().to_vec()));
     }
 }

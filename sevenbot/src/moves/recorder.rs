@@ -85,26 +85,3 @@ impl Recorder {
         Ok(None)
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::simulated::{self, SimulationConfig};
-
-    #[test]
-    fn reports_from_before_the_recording_are_no_poses_of_it() -> Result<(), Box<dyn std::error::Error>> {
-        let (mut arm, _) = simulated::arm(SimulationConfig::default())?;
-        let content = arm.exact_positions()?;
-        arm.with_reports(50, content, |arm| -> Result<(), MoveError> {
-            arm.sleep(Duration::from_millis(500));
-            // A read receives the reports that wait in the line.
-            arm.positions()?;
-            let begun = arm.now();
-            let mut recorder = Recorder::new(arm, 50, content);
-            let first = recorder.next(arm, Duration::from_secs(1))?;
-            assert!(first.is_some_and(|pose| pose.received > begun), "{first:?}");
-            Ok(())
-        })?;
-        Ok(())
-    }
-}

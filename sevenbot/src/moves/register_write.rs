@@ -7,6 +7,7 @@ use protocol_core::registers::map21::WRIST_POSITION;
 use super::error::MoveError;
 use crate::arm::Arm;
 use crate::health::MoveCheck;
+use crate::joints::bits;
 use host_link::Span;
 
 /// The position of the wrist sets the targets of joints 1 to 3.
@@ -68,7 +69,7 @@ fn joints_with_target(span: Span) -> u8 {
         let is_of_wrist = has_wrist && joint.number() <= WRIST_JOINTS;
         is_of_wrist || holds(TARGET_POSITION.of(*joint), 1) || holds(FINE_TARGET.of(*joint), 2)
     };
-    Joint::ALL.into_iter().filter(is_target).fold(0, |bits, joint| bits | joint.bit())
+    bits(Joint::ALL.into_iter().filter(is_target))
 }
 
 #[cfg(test)]
