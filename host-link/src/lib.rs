@@ -10,8 +10,9 @@
 //! ```
 //!
 //! It reads no clock and opens no port: time and bytes are arguments. The blocking library, the hub of `sevenbot serve` and
-//! the page in a browser are shells round it. It does not know what the registers of the arm mean; beside it are those of a server
-//! ([`sharing`]), and what every stop has to know of the arm's limits ([`keep_limits`]).
+//! the page in a browser are shells round it. It does not know what the registers of the arm mean, but
+//! for two things that all of them share: the registers of a server ([`sharing`]), and the limits that a stop has to keep
+//! ([`keep_limits`]).
 //!
 //! ```
 //! use host_link::{HostEvent, HostLink, LinkOptions, Patience, Span};

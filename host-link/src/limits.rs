@@ -1,7 +1,7 @@
 //! The targets that hold an arm, within its limits ([D25](protocol_core::decisions#d25)).
 //!
-//! An arm refuses a frame whole whose targets are against a limit, also where its joints were measured there: a joint that moves is
-//! some degrees off its set-point. A stop that wrote these positions would stop no joint at all.
+//! An arm refuses a frame of targets whole if one is against a limit, even if a joint was measured there: a joint that moves is some
+//! degrees off its set-point. A stop that wrote such positions would stop no joint at all.
 
 use protocol_core::registers::JOINTS;
 use protocol_core::registers::map::limit;

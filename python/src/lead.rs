@@ -55,7 +55,7 @@ impl PacedStream<'_> {
         Ok(())
     }
 
-    /// After a failure of the whole arm the next point is a first one. A stop and a first point that is far away are no failures of it.
+    /// After a failure of the whole arm the next point is a first one. A stop, and a first point that is far away, are not such failures.
     pub(crate) fn note_failure<T>(&mut self, done: &Result<T, MoveError>) {
         let is_of_arm = |failure: &MoveError| {
             !matches!(failure, MoveError::Interrupted | MoveError::StartTooFar(_)) && ends_leading(failure)

@@ -17,7 +17,7 @@ use host_link::{Snapshot, Span};
 
 /// The layout of the extended block that this library knows.
 pub(crate) const KNOWN_LAYOUT: u8 = 1;
-/// What tells a stream from one that its program has ended.
+/// The period of a stream, and its watchdog: a program that ends its stream switches both off.
 const PERIOD_AND_WATCHDOG: Span = Span::between(&SET_POINT_PERIOD, &HOST_WATCHDOG);
 
 impl Arm {

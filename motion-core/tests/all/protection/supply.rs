@@ -83,7 +83,7 @@ fn d29_an_adapter_that_was_gone_is_no_lost_supply() {
 }
 
 #[test]
-fn d29_a_servo_that_was_hot_before_an_emergency_stop_hides_it_not() {
+fn d29_an_emergency_stop_is_noticed_also_if_a_servo_was_hot_before_it() {
     // The joint is turned meanwhile, so its alarm tells with the first answer that nothing holds it. At some of these times it
     // answers last.
     for (number, millis) in
