@@ -228,7 +228,7 @@ impl<'a> SetPointStream<'a> {
         Ok(())
     }
 
-    /// The joints that got a point, as [`Joint::bit`]s.
+    /// The joints that got a point, as [`Joint::bit`](crate::Joint::bit)s.
     #[must_use]
     pub const fn joints(&self) -> u8 {
         self.check.joints()
