@@ -17,8 +17,7 @@ const LOST_AFTER: Duration = Duration::from_millis(900);
 const NOTICE_TIME: Duration = Duration::from_millis(3_000);
 /// A joint is let go once its torque was read off this often: one reading may be false.
 const LOST_BY: u8 = 2;
-/// Goals that are sent after an answer that took this long may be from before it: they are calculated in each control cycle.
-const LATE: Duration = Duration::from_millis(10);
+
 /// The registers of a reading.
 const READING: usize = 8;
 
@@ -56,8 +55,8 @@ struct Known {
     held_goal: Option<u16>,
     /// In counts.
     position: Option<u16>,
-    /// The position before a late answer.
-    position_before: Option<u16>,
+    /// The lowest and the highest position since the last goal, and before it since the goal before, in counts.
+    positions: [Option<(u16, u16)>; 2],
 }
 
 /// What is known of all servos.
@@ -130,10 +129,16 @@ impl ServoReplies {
         self.servos[joint].position
     }
 
-    /// The measured positions from which the next goal may be calculated: the last one, and the one before a late answer.
+    /// The lowest and the highest measured positions from which the next goal may be calculated. A position just before the last
+    /// goal came too late for that one: goals are calculated in each control cycle.
     pub(super) fn positions(&self, joint: Joint) -> impl Iterator<Item = u16> {
-        let servo = self.servos[joint];
-        [servo.position, servo.position_before].into_iter().flatten()
+        self.servos[joint].positions.into_iter().flatten().flat_map(|(lowest, highest)| [lowest, highest])
+    }
+
+    /// The servo is sent a goal.
+    pub(super) fn goal_is_sent(&mut self, joint: Joint) {
+        let [since_goal, before] = self.servos[joint].positions;
+        self.servos[joint].positions = [None, since_goal.or(before)];
     }
 
     /// The goal that the servo held with torque when its torque was read last, in counts.
@@ -155,6 +160,7 @@ impl ServoReplies {
         until_doubt: Duration,
     ) -> Duration {
         let servo = &mut self.servos[joint];
+
         let phases = std::mem::take(&mut servo.ended_doubts).max(1);
         let last = now - servo.trusted_at;
         Duration::from_micros(phases * until_doubt.as_micros() + last.as_micros())
@@ -221,8 +227,11 @@ impl Known {
             self.silence = (since, now);
         }
         if let Some(&[high, low, ..]) = measurements(params) {
-            self.position_before = self.position.filter(|_| now - self.asked_at > LATE);
-            self.position = Some(u16::from_be_bytes([high, low]));
+            let position = u16::from_be_bytes([high, low]);
+            self.position = Some(position);
+            let [since_goal, _] = &mut self.positions;
+            let (lowest, highest) = since_goal.get_or_insert((position, position));
+            (*lowest, *highest) = (position.min(*lowest), position.max(*highest));
         }
         if let Some(code) = torque_switch(params) {
             if self.is_doubtful {

@@ -27,6 +27,7 @@ impl CommandChecker {
             self.goal_at[joint] = context.now;
             self.check_responding(joint, "is driven", context)?;
             self.check_goal(joint, u16::from_be_bytes([high, low]), context)?;
+            self.replies.goal_is_sent(joint);
         }
         for joint in Joint::ALL.into_iter().filter(|joint| !has_goal[*joint]) {
             self.paused[joint] = self.ranges[joint].take().or(self.paused[joint]);

@@ -29,6 +29,15 @@ fn has(replies: &mut ServoReplies, millis: u64, torque: Torque) {
     replies.received(at_ms(millis + 1), &answer);
 }
 
+/// The servo is asked, and answers where it stands, in counts.
+fn stands(replies: &mut ServoReplies, millis: u64, counts: u16) {
+    replies.asked(at_ms(millis), JOINT, 8, true);
+    let [high, low] = counts.to_be_bytes();
+    let mut answer = ServoFrameBuffer::new();
+    frame::status(&mut answer, JOINT.index(), 0, &[high, low, 0, 0, 0, 0, 0, 0]);
+    replies.received(at_ms(millis + 1), &answer);
+}
+
 #[test]
 fn a_set_point_may_move_between_all_doubts_since_the_last_goal() {
     let mut replies = ServoReplies::new(TorqueCodes::default());
@@ -90,6 +99,24 @@ fn a_servo_that_answers_once_after_each_silence_may_still_be_driven_without_torq
         replies.was_outage()
     };
     assert_eq!([0, 1, 2].map(has_outage_after), [true, true, false]);
+}
+
+#[test]
+fn the_next_goal_may_follow_from_each_position_since_the_last_goal() {
+    let mut replies = ServoReplies::new(TorqueCodes::default());
+    let mut measured = |millis, position: u16| {
+        stands(&mut replies, millis, position);
+        replies.positions(JOINT).collect::<Vec<_>>()
+    };
+    measured(0, 500);
+    measured(10, 466);
+    assert_eq!(measured(20, 480), [466, 500]);
+    replies.goal_is_sent(JOINT);
+    stands(&mut replies, 30, 409);
+    let positions = |replies: &ServoReplies| replies.positions(JOINT).collect::<Vec<_>>();
+    assert_eq!(positions(&replies), [409, 409, 466, 500], "they may have come too late for the last goal");
+    [(); 2].into_iter().for_each(|()| replies.goal_is_sent(JOINT));
+    assert_eq!(positions(&replies), [409, 409], "none is newer");
 }
 
 #[test]
