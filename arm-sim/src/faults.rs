@@ -76,8 +76,8 @@ pub enum UnknownArmFault {
          arm=goal-starts-torque"
     )]
     Location,
-    /// The part after the joint is not a fault of a servo.
-    #[error(transparent)]
+    /// The part after the joint is not a fault of a servo, and no obstacle.
+    #[error("{0}; or an obstacle: wall=DEGREES, push=MILLINEWTON_METRES or thing=DEGREES")]
     Kind(#[from] UnknownFault),
     /// The part after the joint is not an obstacle.
     #[error(transparent)]

@@ -1,7 +1,8 @@
 //! The stack guard: register values for a region of the memory protection unit that denies all access, at the end of the
 //! stack. The address range below the RAM is reserved, and the chip does not guarantee a fault there (RM0090, section 2.3).
 
-/// Bytes of the guard: more than the stack frame of any function, so that no function can skip the guard.
+/// Bytes of the guard: more than the stack frame of any function that runs after the start, so that none can skip the guard. The
+/// larger frames of the start are at the top of the stack.
 pub const SIZE: u32 = 1024;
 
 /// MPU_CTRL (ARMv7-M reference manual, B3.5.5): enabled, with the default memory map outside the region (PRIVDEFENA).

@@ -213,12 +213,17 @@ impl OpenArguments<'_> {
             found.ok_or_else(|| InvalidValue::raise(py, &format!("map {version}: use \"2.1\" or \"2.2\"")))
         };
         Ok(ArmOptions {
-            baud: whole(py, "baud", self.baud, 1, 4_000_000)?,
+            baud: baud_rate(py, self.baud)?,
             reply_timeout: duration(py, self.timeout)?,
             attempts: whole(py, "attempts", self.attempts, 1, 1_000)?,
             map: self.map.map(wanted).transpose()?,
         })
     }
+}
+
+/// The baud rate of a port. Below 1,200 a program would wait for minutes for an answer.
+pub(crate) fn baud_rate(py: Python<'_>, baud: i64) -> PyResult<u32> {
+    whole(py, "baud", baud, 1_200, 4_000_000)
 }
 
 /// A whole number within a range.

@@ -5,7 +5,7 @@ use sevenbot::Identity;
 use sevenbot::network::{Address, is_token};
 use sevenbot::ports::{ProbeResult, probe, reachable};
 
-use crate::arguments::{PortName, whole};
+use crate::arguments::{PortName, baud_rate, whole};
 use crate::errors::{InvalidType, InvalidValue, PortError, error};
 
 /// The arms of this machine: port, description, device id (register 11), firmware version and `chip_id`. Their ports are serial
@@ -14,13 +14,14 @@ use crate::errors::{InvalidType, InvalidValue, PortError, error};
 /// Asks all ports at the same time, at `baud` bits per second, for about half a second.
 #[pyfunction]
 #[pyo3(signature = (baud = 115_200))]
-pub(crate) fn ports(py: Python<'_>, baud: u32) -> Vec<(String, String, u8, String, String)> {
+pub(crate) fn ports(py: Python<'_>, baud: i64) -> PyResult<Vec<(String, String, u8, String, String)>> {
+    let baud = baud_rate(py, baud)?;
     let found = py.detach(|| probe(reachable(), baud));
     let arms = found.into_iter().filter_map(|found| {
         let (identity, id) = found.answer.ok()?;
         Some((found.port.name, found.port.description, id, identity.version(), identity.chip_name()))
     });
-    arms.collect()
+    Ok(arms.collect())
 }
 
 /// The token for a server, which has to be at an address that takes one.

@@ -270,6 +270,7 @@ WRONG: dict[str, tuple[type[Exception], Wrong]] = {
     "seed": (ValueError, lambda arm: sevenbot.Arm.simulated(-1)),
     "attempts": (ValueError, lambda arm: sevenbot.Arm.simulated(attempts=-1)),
     "baud": (ValueError, lambda arm: sevenbot.Arm("x", baud=-1)),
+    "baud of ports": (ValueError, lambda arm: sevenbot.ports(1)),
     "a port": (TypeError, lambda arm: sevenbot.Arm(5)),  # type: ignore[arg-type]
     "rows": (TypeError, lambda arm: sevenbot.Recording.from_points([0], [[1, 2]])),
     "a file": (FileNotFoundError, lambda arm: sevenbot.Recording.load("/no/such/file")),

@@ -101,7 +101,7 @@ pub(crate) struct Global {
     #[arg(long, global = true, env = "SEVENBOT_PORT", hide_env_values = true)]
     pub(crate) port: Option<String>,
     /// Baud rate of the port. The arm starts with the rate in its register 12.
-    #[arg(long, global = true, default_value_t = 115_200, value_parser = value_parser!(u32).range(1..))]
+    #[arg(long, global = true, default_value_t = 115_200, value_parser = value_parser!(u32).range(1_200..=4_000_000))]
     pub(crate) baud: u32,
     /// Timeout for an answer in milliseconds. A question is sent again whenever its answer is overdue, for three times as long.
     #[arg(long, global = true, value_name = "MS", env = "SEVENBOT_TIMEOUT", hide_env_values = true,

@@ -48,8 +48,21 @@ pub const LED: Pin = Pin::new(GpioPort::C, 12);
 /// Level that switches the LED on.
 pub const LED_ACTIVE: Active = Active::Low;
 
-/// Timeout of an answer. A servo as delivered waits 0.5 ms, then its longest answer takes 0.21 ms on the wire.
+/// The time of so many bytes on the servo bus, in microseconds.
+pub const fn servo_micros(bytes: u32) -> u32 {
+    10_000_000 / SERVO_BAUD * bytes
+}
+
+/// Timeout of an answer. A servo as delivered waits 0.5 ms, then its longest answer takes 0.33 ms on the wire.
 pub const SERVO_TIMEOUT: Duration = Duration::from_millis(3);
+
+const _: () = assert!(
+    SERVO_TIMEOUT.as_micros() >= 1_000 + servo_micros(LONGEST_ANSWER) as u64,
+    "with this SERVO_BAUD the servos' answers come after SERVO_TIMEOUT"
+);
+
+/// Bytes of the longest answer of a servo: torque switch to measurements.
+const LONGEST_ANSWER: u32 = 33;
 /// Timeout in the emulator, where bytes are late on a busy machine.
 pub const SERVO_TIMEOUT_EMULATED: Duration = Duration::from_millis(50);
 /// Idle time of the servo bus before each frame. A servo releases the line some microseconds after its last stop bit.

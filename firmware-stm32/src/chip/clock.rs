@@ -173,6 +173,8 @@ impl Clock {
     /// Starts TIM2 and the system timer.
     pub fn start(timer: &pac::TIM2, mut ticker: SYST, rates: ClockRates) -> Self {
         timer.psc().write(|w| w.psc().set(clock_rates::microsecond_prescaler(rates.timer)));
+        // The manual gives 0 after a reset (RM0090, section 18.4.12), with which the counter stands still.
+        timer.arr().write(|w| w.arr().set(u32::MAX));
         // An update event loads the prescaler and clears the count.
         timer.egr().write(|w| w.ug().update());
         timer.cr1().write(|w| w.cen().enabled());
@@ -189,9 +191,12 @@ impl Clock {
         if let Some(cycles) = tick::cycles(wait, self.cycles_per_micro)
             && cycles < SYST::get_current()
         {
-            FULL_TICK.store(reload(self.cycles_per_micro), Ordering::Relaxed);
-            self.ticker.set_reload(cycles.max(1));
-            self.ticker.clear_current();
+            // A tick between these writes would restore the period before it is short, and it would stay short.
+            cortex_m::interrupt::free(|_| {
+                FULL_TICK.store(reload(self.cycles_per_micro), Ordering::Relaxed);
+                self.ticker.set_reload(cycles.max(1));
+                self.ticker.clear_current();
+            });
         }
     }
 
@@ -223,8 +228,7 @@ fn SysTick() {
     let full = FULL_TICK.load(Ordering::Relaxed);
     if full != 0 {
         FULL_TICK.store(0, Ordering::Relaxed);
-        // SAFETY: `tick_within` writes the same registers. If this handler interrupts it, the next tick is short or
-        // full. That only changes when the loop wakes.
+        // SAFETY: `tick_within` writes the same registers, with interrupts masked.
         unsafe {
             let timer = &*SYST::PTR;
             timer.rvr.write(full);

@@ -32,8 +32,8 @@ static RESET_CAUSE: AtomicU32 = AtomicU32::new(0);
 /// no pause ends its wait, it takes two frames of 22 bytes and a part of the third for them. A servo that hears none of the
 /// four holds its goal.
 const REPEATS: usize = 4;
-/// Pause before each frame, in microseconds: longer than the longest frame and its answer.
-const PAUSE_MICROS: u32 = 2_000;
+/// Pause before each frame, in microseconds: longer than the longest frame (57 bytes), or than a servo's wait and its answer.
+const PAUSE_MICROS: u32 = 1_000 + board::servo_micros(100);
 /// Polls until a byte is sent, which takes 1,680 cycles at 168 MHz.
 const SEND_POLLS: u32 = 20_000;
 
@@ -101,7 +101,7 @@ fn keep_rate(usart: &pac::USART2, rcc: &pac::RCC) -> ClockRates {
     let rates = ClockSource::Internal.rates();
     rcc.cfgr().modify(|_, w| w.ppre1().div1());
     let divisor = clock_rates::usart_divisor(rates.apb1, board::SERVO_BAUD);
-    usart.brr().write(|w| w.div_mantissa().set(divisor >> 4));
+    usart.brr().write(|w| w.div_mantissa().set(divisor >> 4).div_fraction().set((divisor & 0xF) as u8));
     rates
 }
 
