@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import math
 import sys
+import time
 from collections.abc import Sequence
 from typing import Any
 
 import rclpy
 from rclpy.signals import SignalHandlerOptions
 from sevenbot_ros.__main__ import spin
+from sevenbot_ros.messages import stamp
 from sevenbot_ros.node import ArmNode
 from sevenbot_ros.signals import EndSignals
 from sevenbot_ros.trajectory_action import Goal, TrajectoryAction
@@ -71,6 +73,13 @@ def claw() -> JointTrajectory:
     return message
 
 
+def later(seconds: float) -> JointTrajectory:
+    """The way to `BEGIN`, that begins so many seconds later."""
+    message = way_to_begin()
+    message.header.stamp = stamp(time.time() + seconds)
+    return message
+
+
 def wrong(name: str) -> JointTrajectory:
     """A trajectory that is refused."""
     message = JointTrajectory(joint_names=[name])
@@ -79,7 +88,15 @@ def wrong(name: str) -> JointTrajectory:
     return message
 
 
-TRAJECTORIES = {1: long_path, 2: lambda: wrong("joint_9"), 3: lambda: wrong("joint_1"), 4: way_to_begin, 5: claw}
+TRAJECTORIES = {
+    1: long_path,
+    2: lambda: wrong("joint_9"),
+    3: lambda: wrong("joint_1"),
+    4: way_to_begin,
+    5: claw,
+    6: lambda: later(4.0),
+    7: lambda: later(25.0),
+}
 
 
 class StandIn:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -52,7 +53,7 @@ def test_a_goal_is_read() -> None:
     )
     goal = PublishedAdapter(Action()).goal(request)
     # 0 is the default of the server, and a negative number is no limit.
-    assert goal.path_tolerance == {"joint_1": 0.1} and goal.goal_tolerance == {}
+    assert goal.path_tolerance == {"joint_1": 0.1, "joint_2": math.inf} and goal.goal_tolerance == {}
     assert goal.goal_time == 1.5 and goal.trajectory.joint_names == ["joint_1"]
 
 

@@ -173,6 +173,9 @@ def test_the_linkage_counts_joints_that_the_command_does_not_name() -> None:
 def test_an_arm_that_a_hand_left_outside_may_come_back() -> None:
     following = Follower((90, 160, 70, 90, 90, 90, 80), jump=Jump.APPROACH)
     assert following.take(Targets({1: 158.0})) is None
+    refused = following.take(Targets({1: 158.5}))
+    assert refused is not None and refused.key == "linkage", "further out"
+    assert following.take(Targets({1: 150.0})) is None
 
 
 def test_a_warning_passes_once_in_a_period_and_the_rest_is_counted() -> None:

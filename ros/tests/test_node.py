@@ -169,9 +169,11 @@ def test_a_controller_that_is_killed_and_started_again_as_an_unplugged_arm(start
 
 
 def test_services(start: Start, client: Clients) -> None:
-    start.node(real_time_factor=4.0)
+    node = start.node(real_time_factor=4.0)
     calling = client(simulated_time=True)
     calling.connect()
+    calling.send({"joint_1": 0.0}, stamp=-1.0)
+    calling.until(lambda: "s old" in node.text(), "the refusal of a command from before 1970")
     assert calling.call("vacuum", True) == (True, "the pump sucks")
     calling.diagnostics.clear()
     calling.until(lambda: any(value.value == "sucks" for value in values(calling)), "diagnosis of the pump")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import signal
 from collections.abc import Callable
 from typing import Any
 
@@ -83,6 +84,45 @@ def test_an_action_of_500_points(start: Start, client: Clients, report: Report) 
     standing = leading.degrees()[0]
     leading.until(lambda: leading.seconds() > settled + 1.0, "time")
     assert leading.degrees()[0] == pytest.approx(standing, abs=0.3)
+    server.destroy()
+
+
+def test_a_stop_is_served_while_goals_wait_for_their_start(start: Start, client: Clients) -> None:
+    node = start.node(module="stand_in")
+    leading = client(simulated_time=True)
+    leading.connect()
+    server = ActionClient(leading.node, Fibonacci, "arm_controller/follow_joint_trajectory")
+    leading.until(server.server_is_ready, "the action")
+    begin = leading.seconds()
+    waiting = [goal(leading, server, 7, []) for _ in range(4)]
+    assert all(handle.accepted for handle in waiting)
+    assert not goal(leading, server, 4, []).accepted, "each goal takes a thread"
+    cancelled = waiting[0].cancel_goal_async()
+    leading.until(cancelled.done, "the answer to the cancellation")
+    assert result(leading, waiting[0])[0] == 5
+    assert leading.call("stop")[0]
+    assert leading.seconds() - begin < 20.0, "it did not wait for the start of the goals"
+    assert [result(leading, handle) for handle in waiting[1:]] == [(6, -1)] * 3
+    assert leading.call("hold")[0]
+    goal(leading, server, 7, [])
+    server.destroy()
+    assert node.end(signal.SIGINT) == 0
+
+
+def test_a_goal_begins_where_the_arm_stands_at_its_start(start: Start, client: Clients) -> None:
+    node = start.node(module="stand_in")
+    leading = client(simulated_time=True)
+    leading.connect()
+    server = ActionClient(leading.node, Fibonacci, "arm_controller/follow_joint_trajectory")
+    leading.until(server.server_is_ready, "the action")
+    assert leading.call("home")[0]
+    assert result(leading, goal(leading, server, 4, [])) == (4, 0), node.text()
+    leading.states.clear()
+    later, way = goal(leading, server, 6, []), goal(leading, server, 1, [])
+    assert result(leading, way) == (6, -1) and "another one replaces it" in node.text()
+    assert result(leading, later) == (4, 0), node.text()
+    fastest = max(abs(math.degrees(speed)) for state in leading.states for speed in state.velocity[:6])
+    assert 10.0 < fastest < 70.0, "it leaps at 114 degrees a second"
     server.destroy()
 
 

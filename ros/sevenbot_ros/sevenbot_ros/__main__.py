@@ -11,10 +11,10 @@ from rclpy.signals import SignalHandlerOptions
 from sevenbot_ros.node import ArmNode
 from sevenbot_ros.parameters import WrongParameter
 from sevenbot_ros.signals import EndSignals
-from sevenbot_ros.trajectory_action import TrajectoryAction, published_type
+from sevenbot_ros.trajectory_action import TRAJECTORIES, TrajectoryAction, published_type
 
-# Commands, one service that takes long, `stop` beside it, and a trajectory.
-THREADS = 4
+# Commands, a motion, another service, the trajectories, their goals, and `stop`: none of them waits for the others.
+THREADS = 6 + TRAJECTORIES
 # The longest time until a signal is seen, in seconds.
 SIGNAL_PERIOD = 0.1
 

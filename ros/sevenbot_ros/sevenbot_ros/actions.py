@@ -5,6 +5,8 @@ Knows no ROS.
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 import sevenbot
 
 from sevenbot_ros.driver import Driver
@@ -40,8 +42,17 @@ def hold(driver: Driver) -> str:
 def home(driver: Driver) -> str:
     """Move to the standard pose. Paced by the thread of the driver, so that a simulated arm takes its time, too."""
     with driver.motion() as arm:
-        arm.pose(HOME, speed=HOME_SPEED, wait=False)
-        _arrive(driver, arm)
+        speeds = arm.get("speed")
+        try:
+            arm.pose(HOME, speed=HOME_SPEED, wait=False)
+            _arrive(driver, arm)
+        except sevenbot.NotReached:
+            # The other joints would go on, with the speeds that are put back.
+            with suppress(sevenbot.Error):
+                arm.stop()
+            raise
+        finally:
+            arm.set("speed", speeds)
     return "the arm stands in the standard pose"
 
 

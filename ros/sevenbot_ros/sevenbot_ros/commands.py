@@ -62,7 +62,11 @@ def _age(rules: Rules, stamp: float | None, now: float) -> Refusal | None:
     if stamp is None:
         return None
     if now - stamp > rules.max_age:
-        return Refusal("old", f"the command is {now - stamp:.2f} s old, and {rules.max_age:g} s is the limit (max_age)")
+        return Refusal(
+            "old",
+            f"the command is {now - stamp:.2f} s old, and {rules.max_age:g} s is the limit (max_age): do both programs have the "
+            "same clock (use_sim_time)?",
+        )
     if stamp - now > rules.max_age:
         return Refusal(
             "future",

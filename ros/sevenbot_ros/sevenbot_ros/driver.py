@@ -54,6 +54,11 @@ class Driver:
         self._thread.join()
 
     @property
+    def is_closing(self) -> bool:
+        """Does the node end?"""
+        return self._closing.is_set()
+
+    @property
     def measurement(self) -> Measurement | None:
         """The last one; `None` while no arm answers."""
         monitor = self._monitor

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from enum import Enum
 
 from sevenbot_ros.commands import Refusal, Targets, check_linkage
-from sevenbot_ros.joints import NAMES, linkage_is_kept
+from sevenbot_ros.joints import NAMES, linkage, linkage_is_kept
 
 JOINTS = len(NAMES)
 
@@ -53,7 +53,7 @@ class Follower:
         for joint, angle in targets.degrees.items():
             goal[joint] = angle
         # A hand or a restart may have left the arm outside: then only the way back is open.
-        if (refusal := check_linkage(goal)) and linkage_is_kept(self._goal):
+        if (refusal := check_linkage(goal)) and (linkage_is_kept(self._goal) or linkage(goal) > linkage(self._goal)):
             return refusal
         distance, joint = max((abs(to - at), joint) for joint, (to, at) in enumerate(zip(goal, self._goal, strict=True)))
         if distance > self._max_jump:

@@ -69,6 +69,11 @@ class Limits:
         )
 
 
+def linkage(degrees: Sequence[float]) -> float:
+    """How far joint 2 + joint 3 of the model is from 0 in this pose, in degrees."""
+    return abs(degrees[1] - ZEROS[1] + degrees[2] - ZEROS[2])
+
+
 def linkage_is_kept(degrees: Sequence[float]) -> bool:
     """Does the linkage allow joints 2 and 3 of this pose? Within a tenth of a degree."""
-    return abs(degrees[1] - ZEROS[1] + degrees[2] - ZEROS[2]) <= LINKAGE + 0.1
+    return linkage(degrees) <= LINKAGE + 0.1

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 import sevenbot
-from builtin_interfaces.msg import Time
+from builtin_interfaces.msg import Duration, Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import PoseStamped
 from sensor_msgs.msg import JointState
@@ -20,6 +20,11 @@ Quaternion = tuple[float, float, float, float]
 ALL_NAMES = [*NAMES, *(name for name, _, _ in PASSIVE)]
 # The axes of joints 1 and 3 to 6 in the straight pose: joint 2 turns the rear arm only, because the linkage keeps the forearm.
 AXES = ((0, (0.0, 0.0, 1.0)), (2, (0.0, 1.0, 0.0)), (3, (-1.0, 0.0, 0.0)), (4, (0.0, 1.0, 0.0)), (5, (-1.0, 0.0, 0.0)))
+
+
+def seconds(message: Time | Duration) -> float:
+    """A time or a duration of ROS in seconds. Unlike those of rclpy, it may be negative."""
+    return float(message.sec + message.nanosec / 1e9)
 
 
 def stamp(seconds: float) -> Time:

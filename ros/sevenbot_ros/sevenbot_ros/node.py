@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 
 import sevenbot
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
-from rclpy.time import Time
+
 from rosgraph_msgs.msg import Clock
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped
@@ -21,6 +22,7 @@ from sevenbot_ros.commands import Refusal, Throttle, check
 from sevenbot_ros.driver import Driver
 from sevenbot_ros.events import Measurement
 from sevenbot_ros.health import Health
+from sevenbot_ros.joints import NAMES
 from sevenbot_ros.opening import SIMULATOR
 
 COMMANDS = "robot_joint_command"
@@ -47,8 +49,9 @@ class ArmNode(Node):
         self._throttle = Throttle()
         self._hardware = settings.port
         self._rules = settings.rules
-        # Simulated time begins at the present, so that stamps of programs without simulated time are near, too.
-        self._epoch = self.get_clock().now().nanoseconds / 1e9 if self._is_simulated else 0.0
+        # The time at which that of a simulated arm was 0. It begins at the present, so that stamps of programs without simulated
+        # time are near, too.
+        self._epoch: float | None = None
         self._frame = f"{self.get_parameter('frame_prefix').value}base_link"
         self.driver = Driver(settings, self)
         self._open_topics()
@@ -84,12 +87,17 @@ class ArmNode(Node):
         )
 
     def _open_services(self) -> None:
-        # `stop` must not wait for `home`.
-        group = ReentrantCallbackGroup()
-        for name, act in (("stop", actions.stop), ("home", actions.home), ("park", actions.park), ("hold", actions.hold)):
+        # `stop` must not wait for `home`, nor `hold`. Calls of one group wait for each other, so that they do not take all threads.
+        motions, others = MutuallyExclusiveCallbackGroup(), MutuallyExclusiveCallbackGroup()
+        self.create_service(Trigger, "stop", self._trigger(actions.stop), callback_group=ReentrantCallbackGroup())
+        for name, act, group in (
+            ("home", actions.home, motions),
+            ("park", actions.park, motions),
+            ("hold", actions.hold, others),
+        ):
             self.create_service(Trigger, name, self._trigger(act), callback_group=group)
         for name, switch in (("torque", actions.torque), ("vacuum", actions.vacuum)):
-            self.create_service(SetBool, name, self._switch(switch), callback_group=group)
+            self.create_service(SetBool, name, self._switch(switch), callback_group=others)
 
     def start(self) -> None:
         """Open the arm."""
@@ -126,12 +134,12 @@ class ArmNode(Node):
 
     def seconds(self) -> float:
         """The present time of this arm: that of ROS, or simulated time."""
-        if self._is_simulated:
+        if self._epoch is not None:
             return self._epoch + self.driver.now()
         return float(self.get_clock().now().nanoseconds) / 1e9
 
     def _command(self, message: JointState) -> None:
-        stamped = Time.from_msg(message.header.stamp).nanoseconds / 1e9
+        stamped = messages.seconds(message.header.stamp)
         answer = check(self._rules, message.name, message.position, stamped or None, self.seconds())
         if isinstance(answer, Refusal):
             self.refused(answer)
@@ -143,30 +151,36 @@ class ArmNode(Node):
 
     def refused(self, refusal: Refusal) -> None:
         """Warns, once in five seconds for each kind of refusal."""
-        held = self._throttle.pass_(refusal.key, self.get_clock().now().nanoseconds / 1e9)
+        self._warn(refusal.key, f"command refused: {refusal.text}")
+
+    def _warn(self, key: str, text: str) -> None:
+        held = self._throttle.pass_(key, self.get_clock().now().nanoseconds / 1e9)
         if held is not None:
             more = f" ({held} more since the last warning)" if held else ""
-            self.get_logger().warning(f"command refused: {refusal.text}{more}")
+            self.get_logger().warning(f"{text}{more}")
 
     def measured(self, measurement: Measurement) -> None:
         """Publishes the state."""
         # The mean age of a measurement: half a cycle of the controller less than the greatest.
-        time = messages.stamp(self.seconds() - max(measurement.age - 0.005, 0.0))
-        if any(angle != angle for angle in measurement.positions):
+        stamp = messages.stamp(self.seconds() - max(measurement.age - 0.005, 0.0))
+        if unknown := [name for name, angle in zip(NAMES, measurement.positions, strict=True) if angle != angle]:
+            self._warn("unmeasured", f"no state is published: {', '.join(unknown)} was not measured yet: is its servo plugged in?")
             return
-        self._states.publish(messages.joint_state(measurement, time, passive=False))
+        self._states.publish(messages.joint_state(measurement, stamp, passive=False))
         if self._joint_states is not None:
-            self._joint_states.publish(messages.joint_state(measurement, time, passive=True))
-        self._tip.publish(messages.tip_pose(measurement, time, self._frame))
+            self._joint_states.publish(messages.joint_state(measurement, stamp, passive=True))
+        self._tip.publish(messages.tip_pose(measurement, stamp, self._frame))
 
     def diagnosed(self, diagnosis: Health) -> None:
         """Publishes the health."""
-        time = messages.stamp(self.seconds())
+        stamp = messages.stamp(self.seconds())
         name = f"{self.get_fully_qualified_name()}: arm"
-        self._diagnostics.publish(messages.diagnostics(diagnosis, time, name, self._hardware))
+        self._diagnostics.publish(messages.diagnostics(diagnosis, stamp, name, self._hardware))
 
     def passed(self, simulated: float) -> None:
         """Publishes simulated time."""
+        if self._epoch is None:
+            self._epoch = time.time() - simulated
         if self._clock_topic is not None:
             self._clock_topic.publish(Clock(clock=messages.stamp(self._epoch + simulated)))
 

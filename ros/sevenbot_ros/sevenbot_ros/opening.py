@@ -11,6 +11,9 @@ from sevenbot_ros.settings import Settings
 SIMULATOR = "sim"
 # The arm does not measure its joints before this, in seconds.
 START_UP = 1.0
+# The speed of a joint bounds that of a stream. An arm has this one after power-up, in steps of 1.9 degrees a second; another program
+# may have left a slow one.
+SPEED = 60
 
 
 def open_arm(settings: Settings) -> tuple[sevenbot.Arm, Clock]:
@@ -24,6 +27,11 @@ def open_arm(settings: Settings) -> tuple[sevenbot.Arm, Clock]:
         id=settings.id if settings.id >= 0 else None,
         chip=settings.chip or None,
     )
+    try:
+        arm.set("speed", [SPEED] * 7)
+    except BaseException:
+        arm.close()
+        raise
     return arm, RealClock()
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import importlib
 import math
+import threading
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,6 +21,7 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.time import Duration
 from trajectory_msgs.msg import JointTrajectory
 
+from sevenbot_ros import messages
 from sevenbot_ros.commands import Refusal
 from sevenbot_ros.joints import NAMES, ZEROS
 from sevenbot_ros.lead import Outcome, TrajectoryLead
@@ -30,6 +32,9 @@ from sevenbot_ros.trajectory import RawPoint, plan
 GOAL_TOLERANCE = 3.0
 GOAL_TIME = 2.0
 FEEDBACK_PERIOD = 0.1
+# Goals at a time: each controller's, and those that replace them or wait for their start. A goal may wait this long, in seconds.
+TRAJECTORIES = 4
+LONGEST_WAIT = 30.0
 # The parameters with the names of the controllers, and the joints that each of them takes.
 CONTROLLERS = (("controller_name", NAMES), ("claw_controller_name", NAMES[6:]))
 # The codes of `control_msgs/action/FollowJointTrajectory`.
@@ -68,11 +73,14 @@ class PublishedAdapter:
 
     def goal(self, request: Any) -> Goal:
         def tolerances(rows: Any) -> dict[str, float]:
-            return {row.name: row.position for row in rows if row.position > 0.0}
+            # 0 is the tolerance of the server, and -1 is none.
+            return {row.name: math.inf if row.position < 0.0 else row.position for row in rows if row.position}
 
-        goal_time = Duration.from_msg(request.goal_time_tolerance).nanoseconds / 1e9
         return Goal(
-            request.trajectory, tolerances(request.path_tolerance), tolerances(request.goal_tolerance), goal_time
+            request.trajectory,
+            tolerances(request.path_tolerance),
+            tolerances(request.goal_tolerance),
+            messages.seconds(request.goal_time_tolerance),
         )
 
     def feedback(self, names: Sequence[str], desired: Sequence[float], actual: Sequence[float], seconds: float) -> Any:
@@ -102,6 +110,8 @@ class TrajectoryAction:
 
     def __init__(self, action: Any, adapter: GoalAdapter) -> None:
         self._type, self._adapter = action, adapter
+        self._lock = threading.Lock()
+        self._goals = 0
 
     def serve(self, node: ArmNode) -> None:
         """Opens the servers."""
@@ -114,15 +124,34 @@ class TrajectoryAction:
             self._type,
             f"{controller}/follow_joint_trajectory",
             execute_callback=lambda handle: self._execute(handle, joints),
-            goal_callback=lambda _: GoalResponse.ACCEPT,
+            goal_callback=lambda _: self._accept(),
             cancel_callback=lambda _: CancelResponse.ACCEPT,
             callback_group=ReentrantCallbackGroup(),
         )
 
+    def _accept(self) -> GoalResponse:
+        """Each goal takes a thread of the executor until it ends."""
+        with self._lock:
+            if self._goals == TRAJECTORIES:
+                self._node.refused(Refusal("goals", f"{TRAJECTORIES} goals are running or wait: cancel one first"))
+                return GoalResponse.REJECT
+            self._goals += 1
+            return GoalResponse.ACCEPT
+
     def _execute(self, handle: ServerGoalHandle, joints: Sequence[str]) -> Any:
-        lead = self._begin(self._adapter.goal(handle.request), joints)
+        try:
+            return self._follow(handle, joints)
+        finally:
+            with self._lock:
+                self._goals -= 1
+
+    def _follow(self, handle: ServerGoalHandle, joints: Sequence[str]) -> Any:
+        lead = self._begin(handle, joints)
         if isinstance(lead, Refusal):
-            handle.abort()
+            if handle.is_cancel_requested:
+                handle.canceled()
+            else:
+                handle.abort()
             code = INVALID_JOINTS if lead.key == "unknown joint" else OLD_HEADER if lead.key == "old" else INVALID_GOAL
             return self._adapter.result(code, lead.text)
         while not lead.ended.wait(FEEDBACK_PERIOD):
@@ -137,22 +166,20 @@ class TrajectoryAction:
             handle.abort()
         return self._adapter.result(CODES[lead.outcome], lead.reason)
 
-    def _begin(self, goal: Goal, joints: Sequence[str]) -> TrajectoryLead | Refusal:
+    def _begin(self, handle: ServerGoalHandle, joints: Sequence[str]) -> TrajectoryLead | Refusal:
+        goal = self._adapter.goal(handle.request)
         message, driver, settings = goal.trajectory, self._node.driver, self._node.driver.settings
         if others := [name for name in message.joint_names if name not in joints]:
             text = f"this controller has no joint {', '.join(others)}: its joints are {', '.join(joints)}"
             return Refusal("unknown joint", text)
-        start = message.header.stamp.sec + message.header.stamp.nanosec / 1e9
-        now = self._node.seconds()
-        if start and now - start > settings.rules.max_age:
-            return Refusal("old", f"the trajectory began {now - start:.2f} s ago")
+        if refusal := self._wait_for(messages.seconds(message.header.stamp), handle):
+            return refusal
         try:
             standing = driver.standing()
         except sevenbot.Error as error:
             return Refusal("no arm", str(error))
         points = [
-            RawPoint(point.time_from_start.sec + point.time_from_start.nanosec / 1e9, point.positions, point.velocities)
-            for point in message.points
+            RawPoint(messages.seconds(point.time_from_start), point.positions, point.velocities) for point in message.points
         ]
         trajectory = plan(settings.rules, message.joint_names, points, standing)
         if isinstance(trajectory, Refusal):
@@ -165,11 +192,25 @@ class TrajectoryAction:
             settings.period,
             path_tolerance=_degrees(goal.path_tolerance),
             goal_tolerance={joint: GOAL_TOLERANCE for joint in trajectory.joints} | _degrees(goal.goal_tolerance),
-            goal_time=goal.goal_time or GOAL_TIME,
+            goal_time=math.inf if goal.goal_time < 0.0 else goal.goal_time or GOAL_TIME,
         )
-        while start > self._node.seconds():
-            time.sleep(min(start - self._node.seconds(), 0.05))
         return driver.leads.lead(lead) or lead
+
+    def _wait_for(self, start: float, handle: ServerGoalHandle) -> Refusal | None:
+        """Waits until this time, 0 for now. Where the joints stand then is where the trajectory has to begin."""
+        driver = self._node.driver
+        if start and self._node.seconds() - start > driver.settings.rules.max_age:
+            return Refusal("old", f"the trajectory began {self._node.seconds() - start:.2f} s ago")
+        if start - self._node.seconds() > LONGEST_WAIT:
+            text = f"the trajectory begins in {start - self._node.seconds():.0f} s, and {LONGEST_WAIT:g} s is the limit"
+            return Refusal("future", f"{text}: do both programs have the same clock (use_sim_time)?")
+        while (left := start - self._node.seconds()) > 0.0:
+            if handle.is_cancel_requested or driver.is_closing:
+                return Refusal("cancelled", "it was cancelled before it began")
+            if refusal := driver.interlock.refusal():
+                return refusal
+            time.sleep(min(left, 0.05))
+        return None
 
     def _tell(self, handle: ServerGoalHandle, lead: TrajectoryLead) -> None:
         measurement, joints = self._node.driver.measurement, lead.trajectory.joints
