@@ -419,12 +419,12 @@ class Arm:
         the maker's.
         """
     def park(self, *angles: _Goal | _Goals, keep: bool = False) -> _Angles:
-        """Moves slowly to a pose in which the arm may be let go, switches the motors to damping, and checks for two seconds that the
-        arm stays. Returns the measured angles.
+        """Moves slowly to a pose in which the arm may be let go, switches the motors to damping, and checks that the arm stays: for 2
+        seconds in the standard park pose, and for 15 in another one. Returns the measured angles.
 
         Without angles it is the pose that was kept for this arm, or the standard park pose, which is right for an empty gripper:
         rear arm upright, forearm folded up. `keep=True` keeps the given angles for this arm. If a joint sinks by more than 2 degrees,
-        the arm holds again, and `NotReached` is raised. `arm.set("motor-state", 1)` makes a parked arm hold.
+        or still sinks after 5 seconds, the arm holds again, and `NotReached` is raised. `arm.set("motor-state", 1)` makes a parked arm hold.
         """
     def stream(
         self,
@@ -701,7 +701,9 @@ class Observation:
         """When the answer was here: seconds since the arm was opened, on the clock of its line. It never goes back."""
     @property
     def age(self) -> float:
-        """The longest time between the measurement and `time`, in seconds: a cycle of the controller, and that of the exchange."""
+        """The longest time between the measurement and `time`, in seconds: a cycle of the controller, and that of the exchange. While
+        the servo of a joint does not answer, its values are older: those of before. `arm.status()` tells it.
+        """
     @property
     def monotonic(self) -> float:
         """When the answer was here, on the clock of `time.monotonic()`."""

@@ -187,9 +187,10 @@ class Arm:
         return self
 
     async def __aexit__(self, *exception: Any) -> None:
-        """Stops what moves, and closes the port."""
+        """Stops what moves, also in a task that waits for it, and closes the port."""
         if not self._is_closed:
-            await self._call(self.sync.__exit__, *exception)
+            # Not behind the call that runs: this ends it.
+            await asyncio.to_thread(self.sync.__exit__, *exception)
             await self.close()
 
 

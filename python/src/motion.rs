@@ -283,9 +283,14 @@ pub(crate) fn play(
     player.play(arm, options.times, watch)?;
     let mut lines = RecordingLines::new(FileVersion::Hundredths);
     let mut text = lines.head();
+    let start = recording.moments().next().map(|first| first.time).unwrap_or_default();
+    let (mut sent, mut vacuum) = (recording.moments().peekable(), false);
     for (time, pose) in player.measured() {
-        let moment = Moment { time: *time, pose: *pose, vacuum: false };
-        text.extend(lines.add(&moment));
+        let now = start + time.mul_f64(options.factor);
+        while let Some(moment) = sent.next_if(|moment| moment.time <= now) {
+            vacuum = moment.vacuum;
+        }
+        text.extend(lines.add(&Moment { time: *time, pose: *pose, vacuum }));
     }
     Ok(text)
 }

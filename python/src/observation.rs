@@ -86,7 +86,8 @@ impl Observation {
         self.time
     }
 
-    /// The longest time between the measurement and `time`, in seconds: a cycle of the controller, and that of the exchange.
+    /// The longest time between the measurement and `time`, in seconds: a cycle of the controller, and that of the exchange. While
+    /// the servo of a joint does not answer, its values are older: those of before. `arm.status()` tells it.
     #[getter]
     const fn age(&self) -> f64 {
         self.age

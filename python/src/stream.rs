@@ -138,6 +138,8 @@ impl PacedStream<'_> {
 
     /// Goes to the first point of joints. The next point is due afterwards.
     pub(crate) fn approach(&mut self, first: &FineTargets, watch: &mut Watch<'_>) -> Result<(), MoveError> {
+        // Before the end of start-up it is not known where the joints stand.
+        self.stream.arm().wait_until_settled()?;
         let way = Approach::plan(&self.stream.arm().standing()?, first, self.rule)?;
         self.stream.approach(&way, watch)?;
         let now = self.stream.arm().elapsed();

@@ -134,3 +134,14 @@ def test_a_closed_arm_can_be_closed_again() -> None:
         await arm.close()
 
     asyncio.run(run())
+
+
+def test_the_end_of_the_block_ends_a_call_that_runs() -> None:
+    async def run() -> None:
+        async with aio.Arm.simulated() as arm:
+            waiting = asyncio.ensure_future(arm.sleep(80_000))
+            await asyncio.sleep(0.1)
+        with pytest.raises(sevenbot.Interrupted):
+            await waiting
+
+    asyncio.run(run())

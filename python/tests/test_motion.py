@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 from collections.abc import Callable
+from itertools import groupby
 from pathlib import Path
 
 import pytest
@@ -36,6 +37,9 @@ def test_a_stream_that_begins_elsewhere_is_refused_or_approached(simulated_arm: 
             stream.send([150, *[None] * 6])
     assert any("approach=" in hint for hint in refused.value.hints)
     assert simulated_arm.get("fine-target.1") == 9000
+    # Also before the arm has measured its joints.
+    with sevenbot.Arm.simulated() as early, pytest.raises(sevenbot.TooFar, match="joint 1"), early.stream() as stream:
+        stream.send([120, *REST[1:]])
     start = world.now
     with simulated_arm.stream(approach=1.5) as stream:
         assert stream.send([150, *[None] * 6]) == 0
@@ -110,7 +114,9 @@ def test_a_recording_is_played_and_saved(simulated_arm: sevenbot.Arm, tmp_path: 
         simulated_arm.play(loaded)
     measured = simulated_arm.play(loaded, approach=2)
     assert measured.angles[-1][0] == pytest.approx(130, abs=2)
-    assert "moments" in repr(measured)
+    assert "moments" in repr(measured) and not any(measured.vacuum)
+    sucking = sevenbot.Recording.from_points([0, 0.5, 1], [measured.angles[-1]] * 3, vacuum=[False, True, False])
+    assert [state for state, _ in groupby(simulated_arm.play(sucking, approach=1).vacuum)] == [False, True, False]
 
 
 def test_a_guided_arm_is_recorded_and_holds_at_the_end(simulated_arm: sevenbot.Arm) -> None:

@@ -1,27 +1,29 @@
 //! Messages as bytes, in the encoding of ROS 2: CDR, with four bytes before it that name the byte order.
 //!
 //! ```text
-//!   00 01 00 00   CDR, little-endian, no options
+//!   00 01 00 00   CDR, little-endian, and options, which may name the bytes that fill up the end
 //!   ...           the fields, each aligned to its size, counted from here
 //! ```
 
 use byteorder::{BigEndian, LittleEndian};
 use serde::{Deserialize, Serialize};
 
-const LITTLE_ENDIAN: [u8; 4] = [0, 1, 0, 0];
-const BIG_ENDIAN: [u8; 4] = [0, 0, 0, 0];
+const LITTLE_ENDIAN: [u8; 2] = [0, 1];
+const BIG_ENDIAN: [u8; 2] = [0, 0];
+const NO_OPTIONS: [u8; 2] = [0, 0];
 
 /// The bytes of a message.
 pub(crate) fn encode(message: &impl Serialize) -> Result<Vec<u8>, cdr_encoding::Error> {
-    let mut bytes = LITTLE_ENDIAN.to_vec();
+    let mut bytes = [LITTLE_ENDIAN, NO_OPTIONS].concat();
     bytes.extend(cdr_encoding::to_vec::<_, LittleEndian>(message)?);
     Ok(bytes)
 }
 
 /// A message from its bytes; `None` if they are not one.
 pub(crate) fn decode<'a, M: Deserialize<'a>>(bytes: &'a [u8]) -> Option<M> {
-    let (head, body) = bytes.split_first_chunk()?;
-    match *head {
+    let (order, body) = bytes.split_first_chunk()?;
+    let body = body.get(NO_OPTIONS.len()..)?;
+    match *order {
         LITTLE_ENDIAN => Some(cdr_encoding::from_bytes::<M, LittleEndian>(body).ok()?.0),
         BIG_ENDIAN => Some(cdr_encoding::from_bytes::<M, BigEndian>(body).ok()?.0),
         _ => None,
@@ -60,6 +62,9 @@ mod tests {
     fn a_joint_state_has_the_bytes_of_ros() {
         assert_eq!(encode(&state()).expect("bytes"), BYTES.concat());
         assert_eq!(decode(&BYTES.concat()), Some(state()));
+        let mut filled = BYTES.concat();
+        filled[3] = 3;
+        assert_eq!(decode(&filled), Some(state()), "the options name three bytes at the end");
     }
 
     #[test]

@@ -16,6 +16,8 @@ from .connection import CALIBRATION, LOGGER, Connection
 from .device import Device
 from .warned import Warned
 
+SPEED = 60
+"""In steps of 1.9 degrees per second. It bounds that of a stream, and another program may have left a slow one."""
 SHORTEST_APPROACH, LONGEST_APPROACH = 0.1, 60.0
 """What a stream takes, in seconds."""
 TOLERANCE = 0.5
@@ -57,8 +59,9 @@ class Sevenbot(Device, Robot):
         return {**numbers, **images}
 
     def configure(self) -> None:
-        """Makes the motors hold. An arm that was parked is driven again."""
+        """Makes the motors hold, with the speeds of power-up. An arm that was parked is driven again."""
         self._open().arm.torque_on()
+        self._open().arm.set("speed", [SPEED] * 7)
         self._open().follow_time()
 
     @check_if_already_connected

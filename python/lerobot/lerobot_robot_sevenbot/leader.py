@@ -1,5 +1,6 @@
 """The teleoperator `sevenbot_leader`: an arm without torque that you move by hand."""
 
+import time
 from functools import cached_property
 from typing import Any
 
@@ -12,6 +13,12 @@ from .config_sevenbot import SevenbotLeaderConfig
 from .connection import CALIBRATION, LOGGER, Connection
 from .device import Device
 from .hand import Hand
+from .warned import Warned
+
+HEALTH_PERIOD = 0.1
+"""Seconds between two looks at the health of the arm."""
+SILENT = ("no answer", "no servo answers")
+"""The problems of an arm that is led by hand."""
 
 
 class SevenbotLeader(Device, Teleoperator):
@@ -29,6 +36,8 @@ class SevenbotLeader(Device, Teleoperator):
         super().__init__(config)
         self.config = config
         self._hand: Hand | None = None
+        self._warned = Warned()
+        self._next_check = 0.0
 
     @cached_property
     def feedback_features(self) -> dict[str, type]:
@@ -65,7 +74,24 @@ class SevenbotLeader(Device, Teleoperator):
             # Before the time passes: what is measured then is where the hand is now.
             self._hand.lead()
         connection.follow_time()
+        self._check_health(connection.arm)
         return joints.to_lerobot("pos", joints.within_limits(map(float, self._positions(connection))))
+
+    def _check_health(self, arm: sevenbot.Arm) -> None:
+        """A servo that does not answer keeps its last position, and motors that drive the joints work against the hand."""
+        if time.monotonic() < self._next_check:
+            return
+        self._next_check = time.monotonic() + HEALTH_PERIOD
+        status = arm.status()
+        if status is None:
+            # The maker's firmware does not tell it.
+            return
+        silent = [problem for problem in status.problems if problem.kind in SILENT]
+        if silent:
+            text = "; ".join(f"{problem}: {problem.remedy}" for problem in silent)
+            self._warned.problems(silent, ConnectionError(f"the leader cannot be read: {text}"))
+        if status.motor_state == "servo":
+            raise ConnectionError("the motors of the leader are on: it restarted, or another program switched them on; connect again")
 
     @staticmethod
     def _positions(connection: Connection) -> Any:

@@ -2,6 +2,7 @@
 
 import logging
 import time
+from collections.abc import Iterable
 
 import sevenbot
 
@@ -27,8 +28,12 @@ class Warned:
 
     def problem(self, error: sevenbot.ArmProblem) -> None:
         """Warns once of joints that stall, and of a short silence. Raises the error if no loop can go on with its problem."""
+        self.problems(error.problems, error)
+
+    def problems(self, problems: Iterable[sevenbot.Problem], error: Exception) -> None:
+        """As `problem`, of these problems."""
         now = time.monotonic()
-        for problem in error.problems:
+        for problem in problems:
             begin, last = self._problems.get(str(problem), (now, -QUIET))
             begin = begin if now - last < GAP else now
             self._problems[str(problem)] = begin, now

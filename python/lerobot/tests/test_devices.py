@@ -274,6 +274,33 @@ def test_a_leader_is_led_by_hand_within_the_followers_limits(now: Clock, tmp_pat
     assert not teleop.is_connected
 
 
+def test_a_leader_that_cannot_be_read_ends_the_loop(now: Clock, caplog: pytest.LogCaptureFixture) -> None:
+    for fault, told in (("3=missing", "joint 3 does not answer"), ("supply=off", "no servo answers")):
+        teleop = leader()
+        simulation(teleop).fault(fault)
+        with pytest.raises(ConnectionError, match=told):
+            for _ in range(60):
+                teleop.get_action()
+                now[0] += FRAME
+        teleop.disconnect()
+    assert "joint 3 does not answer" in caplog.text, "a short silence is told"
+    teleop = leader()
+    arm(teleop).set("motor-state", 1)
+    now[0] += 1
+    with pytest.raises(ConnectionError, match="the motors of the leader are on"):
+        teleop.get_action()
+
+
+def test_speeds_that_another_program_left_do_not_slow_the_arm(now: Clock, monkeypatch: pytest.MonkeyPatch) -> None:
+    left = sevenbot.Arm.simulated()
+    left.sleep(1)
+    left.set("speed", [5] * 7)
+    monkeypatch.setattr("sevenbot.Arm", lambda port: left)
+    robot = make_robot_from_config(SevenbotConfig(port="left", id="test"))
+    robot.connect()
+    assert left.get("speed") == [60] * 7
+
+
 def test_a_leader_waves_without_a_recording(now: Clock) -> None:
     teleop = leader()
     poses = []

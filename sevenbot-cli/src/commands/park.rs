@@ -14,8 +14,9 @@ use crate::watch::ProgressWatch;
 
 /// Move the arm to a pose in which it may be let go, and let it go.
 ///
-/// Moves slowly, then switches the motors to damping (motor state 0) and watches for two seconds. If a joint sinks by more than 2
-/// degrees, the motors hold the arm again, and the command fails.
+/// Moves slowly, then switches the motors to damping (motor state 0) and watches: for 2 seconds in the standard pose, and for 15 in
+/// another one. If a joint sinks by more than 2 degrees, or still sinks after 5 seconds, the motors hold the arm again, and the
+/// command fails.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Without angles the arm goes to the pose that was kept for it with --keep, or
@@ -33,7 +34,7 @@ $XDG_CONFIG_HOME/7bot/park-poses, or in ~/.config/7bot/park-poses; on Windows in
 
 Examples:
   sevenbot park
-  sevenbot park _ 92 2 _ 50 _ _ --keep
+  sevenbot park _ 95 0 _ 50 _ _ --keep
                             this arm parks here from now on
   sevenbot park --standard  the standard pose, although another one is kept
 

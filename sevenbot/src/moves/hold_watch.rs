@@ -18,7 +18,11 @@ use crate::joints::{JointSnapshot, bits};
 
 /// The arm notices a servo that let go after at most 200 ms (D28), and a silent one sooner.
 const WATCH_TIME: Duration = Duration::from_millis(500);
+/// A joint that gives way is blocked after a second (D27).
+const LONGEST_WATCH: Duration = Duration::from_millis(2_000);
 const POLL_PERIOD: Duration = Duration::from_millis(50);
+/// The target that a joint gives itself is at most this far from where it is: the distance at which its servo pushes with its limit.
+const OWN_TARGET_DEGREES: u8 = 4;
 /// A joint that is further from its target, and goes away from it, does not hold. A loaded joint droops by up to 1.5 degrees, and one
 /// that was stopped at speed comes back to its target.
 const HELD_DEGREES: u8 = 10;
@@ -79,7 +83,8 @@ impl Arm {
         self.has_none(|kind| kind == ProblemKind::NoServoAnswers)
     }
 
-    /// Watches for half a second whether all joints hold their targets.
+    /// Watches for half a second whether all joints hold their targets. A joint that engages, or gives way, takes where it is as its
+    /// target: then it is watched for half a second more, until it stays or the arm tells what is in its way.
     ///
     /// # Errors
     /// The motors do not drive the joints, a joint is silent, blocked or let go, a servo has an alarm, the supply was lost, the controller restarted,
@@ -87,14 +92,18 @@ impl Arm {
     /// target at the end, and further than at the start.
     pub fn watch_hold(&mut self) -> Result<(), MoveError> {
         let mut check = MoveCheck::begin(self, bits(Joint::ALL))?;
-        let begun = self.joints()?;
-        let end = self.now() + WATCH_TIME;
+        let mut begun = self.joints()?;
+        let mut end = self.now() + WATCH_TIME;
+        let longest = self.now() + LONGEST_WATCH;
         loop {
             let joints = self.joints()?;
             // After the joints: a restart, too, gives the arm other targets.
             check.check(self)?;
             if joints.targets() != begun.targets() {
-                return Err(MoveError::OtherTargets);
+                if self.now() >= longest || !is_where_it_is(&begun, &joints) {
+                    return Err(MoveError::OtherTargets);
+                }
+                (begun, end) = (joints.clone(), self.now() + WATCH_TIME);
             }
             if self.now() >= end {
                 check_held(&begun, &joints)?;
@@ -115,6 +124,12 @@ impl Arm {
         problems.retain(|problem| is_such(problem.kind));
         if problems.is_empty() { Ok(()) } else { Err(MoveError::Problems(problems)) }
     }
+}
+
+/// Are the targets that changed where their joints are?
+fn is_where_it_is(before: &JointSnapshot, now: &JointSnapshot) -> bool {
+    let changed = Joint::ALL.into_iter().filter(|joint| now.target(*joint) != before.target(*joint));
+    changed.into_iter().all(|joint| now.present(joint).abs_diff(now.target(joint)) <= OWN_TARGET_DEGREES)
 }
 
 /// Fails if something drags joints away from their targets.

@@ -34,9 +34,15 @@ const FOREARM_LIMIT_DEGREES: u8 = 120;
 const SPEED_STEPS: u8 = 10;
 /// The arm is watched for this time after it was let go.
 const WATCH_TIME: Duration = Duration::from_secs(2);
+/// The same in a pose of the user, which may be one that a damped joint leaves by a degree in 15 s, and by a hundred in a minute.
+const WATCH_TIME_OF_OWN_POSE: Duration = Duration::from_secs(15);
+/// Joints that were let go have settled after this time.
+const SETTLING_TIME: Duration = Duration::from_secs(5);
 const POLL_PERIOD: Duration = Duration::from_millis(50);
 /// A joint that moves by more than this after it was let go, in hundredths of a degree, does not stay.
 const STAYS_HUNDREDTHS: u16 = 200;
+/// The same once the joints have settled: more than one count of a servo.
+const CREEPS_HUNDREDTHS: u16 = 30;
 
 /// Why an arm is not parked.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -46,8 +52,8 @@ pub enum ParkError {
     Move(#[from] MoveError),
     /// The joint sank when it was let go. The motors drive it again, and the arm holds.
     #[error(
-        "not parked: joint {} sank by more than 2° when it was let go; the arm holds again. Is something in the gripper, or is \
-         another pose better for this arm?",
+        "not parked: joint {} sinks when it is let go; the arm holds again. Is something in the gripper, or is another pose \
+         better for this arm?",
         joint.number()
     )]
     Sinks {
@@ -63,11 +69,13 @@ impl From<crate::error::Error> for ParkError {
 }
 
 impl Arm {
-    /// Moves slowly to a pose in which the arm may be let go, lets it go (motor state 0), and checks for two seconds that it stays.
-    /// `None`: [`PARK_POSE`], which is right for an arm with an empty gripper. Speeds and times are those of before at the end.
+    /// Moves slowly to a pose in which the arm may be let go, lets it go (motor state 0), and checks that it stays: for 2 seconds in
+    /// [`PARK_POSE`] (`None`), which is right for an arm with an empty gripper, and for 15 seconds in another pose. Speeds and
+    /// times are those of before at the end.
     ///
     /// # Errors
-    /// The arm does not reach the pose. Or a joint moves by more than 2 degrees when it is let go: then the arm holds again.
+    /// The arm does not reach the pose. Or a joint moves by more than 2 degrees when it is let go, or still moves after 5 seconds,
+    /// or the observer ends the check: then the arm holds again.
     pub fn park(
         &mut self,
         pose: Option<FineTargets>,
@@ -79,7 +87,7 @@ impl Arm {
         let restored = self.write_checked(before.address, &before.values);
         moved?;
         restored.map_err(MoveError::from)?;
-        self.let_go_and_watch()
+        self.let_go_and_watch(pose.is_some(), observer)
     }
 
     fn go_to_park_pose(
@@ -98,20 +106,47 @@ impl Arm {
         Ok(())
     }
 
-    fn let_go_and_watch(&mut self) -> Result<[FineAngle; 7], ParkError> {
+    fn let_go_and_watch(
+        &mut self,
+        is_own_pose: bool,
+        observer: &mut dyn Observer,
+    ) -> Result<[FineAngle; 7], ParkError> {
         let start = self.park_positions()?;
         self.write_motion(MOTOR_STATE.address, &[motor_state::DAMPING])?;
-        let deadline = self.now() + WATCH_TIME;
+        let stayed = self.watch_parked(&start, is_own_pose, observer);
+        if let Err(ParkError::Sinks { .. } | ParkError::Move(MoveError::Interrupted)) = stayed {
+            self.write_motion(MOTOR_STATE.address, &[motor_state::SERVO])?;
+        }
+        stayed
+    }
+
+    fn watch_parked(
+        &mut self,
+        start: &[FineAngle; 7],
+        is_own_pose: bool,
+        observer: &mut dyn Observer,
+    ) -> Result<[FineAngle; 7], ParkError> {
+        // One in whole degrees may change by its last digit.
+        let creeps = if self.has_extended_block()? { CREEPS_HUNDREDTHS } else { STAYS_HUNDREDTHS };
+        let begin = self.now();
+        let end = begin + if is_own_pose { WATCH_TIME_OF_OWN_POSE } else { WATCH_TIME };
+        let mut settled = None;
         loop {
             let now = self.park_positions()?;
-            if let Some(joint) = moved_joint(&start, &now) {
-                self.write_motion(MOTOR_STATE.address, &[motor_state::SERVO])?;
+            if self.now() >= begin + SETTLING_TIME {
+                settled.get_or_insert(now);
+            }
+            let crept = settled.and_then(|settled| moved_joint(&settled, &now, creeps));
+            if let Some(joint) = crept.or(moved_joint(start, &now, STAYS_HUNDREDTHS)) {
                 return Err(ParkError::Sinks { joint });
             }
-            if self.now() >= deadline {
+            if self.now() >= end {
                 return Ok(now);
             }
-            self.sleep(POLL_PERIOD);
+            if !observer.goes_on() {
+                return Err(MoveError::Interrupted.into());
+            }
+            observer.pause(self, POLL_PERIOD);
         }
     }
 
@@ -149,12 +184,11 @@ pub fn park_way(pose: Option<FineTargets>, now: [FineAngle; 7]) -> Vec<FineTarge
     down.into_iter().chain([only(1, rear), park]).collect()
 }
 
-fn moved_joint(start: &[FineAngle; 7], now: &[FineAngle; 7]) -> Option<Joint> {
-    let pairs = Joint::ALL.into_iter().zip(start.iter().zip(now));
+fn moved_joint(start: &[FineAngle; 7], now: &[FineAngle; 7], hundredths: u16) -> Option<Joint> {
+    let mut pairs = Joint::ALL.into_iter().zip(start.iter().zip(now));
     pairs
-        .filter(|(_, (start, now))| start.hundredths().abs_diff(now.hundredths()) > STAYS_HUNDREDTHS)
+        .find(|(_, (start, now))| start.hundredths().abs_diff(now.hundredths()) > hundredths)
         .map(|(joint, _)| joint)
-        .next()
 }
 
 #[cfg(test)]
@@ -207,6 +241,22 @@ mod tests {
                 assert!(is_legal(rear, forearm), "{rear} {forearm}");
             }
         }
+    }
+
+    #[test]
+    fn a_pose_of_the_user_is_watched_until_a_joint_that_creeps_is_seen() {
+        let pose = |rear: u8, forearm: u8| {
+            let whole = |degrees: u8| FineAngle::from_degrees(degrees.into());
+            Some([None, whole(rear), whole(forearm), whole(90), whole(50), None, None])
+        };
+        let (mut arm, simulation) = simulated::arm(SimulationConfig::default()).expect("an arm");
+        arm.driven_joints().expect("it is driven");
+        assert_eq!(arm.park(pose(92, 2), &mut ()).map(drop), Err(ParkError::Sinks { joint: Joint::ALL[2] }));
+        assert!(arm.health().is_ok_and(|health| health.is_driven()), "it holds again");
+        arm.park(pose(95, 0), &mut ()).expect("parked");
+        let parked = angles(&simulation);
+        arm.sleep(Duration::from_secs(120));
+        assert_eq!(angles(&simulation), parked);
     }
 
     #[test]

@@ -3,6 +3,7 @@
 use std::error::Error;
 use std::time::Duration;
 
+use protocol_core::registers::Joint;
 use protocol_core::registers::map::{LIMITS, MOTOR_STATE, SET_POINT_PERIOD, SPEED, limit, motor_state};
 
 use super::{ConnectionLost, JointMove, MoveError, Observer, Pace, PaceBefore, Player, Recorder, Stage};
@@ -90,6 +91,19 @@ fn a_joint_that_is_dragged_away_does_not_hold() {
             assert!(holds || text.starts_with("the arm does not hold: joint 2 is at 0°, not "), "{text}");
         }
     }
+}
+
+#[test]
+fn a_joint_that_gives_way_gets_its_target_from_no_other_program() {
+    let (mut arm, simulation) = driven_arm();
+    simulation.with(|arm| arm.plant_mut().set_load(500));
+    let level = [90, 90, 20, 90, 60, 90, 80].map(|degrees| FineAngle::from_degrees(degrees.into()));
+    let blocked = JointMove::begin_fine(&mut arm, level).and_then(|there| there.finish(&mut arm, &mut ()));
+    let Err(MoveError::Problems(problems)) = blocked else { panic!("{blocked:?}") };
+    assert!(problems.iter().any(|problem| problem.kind == ProblemKind::Blocked), "{problems:?}");
+    let sinking = arm.joints().expect("an answer");
+    assert_eq!(arm.engage_and_watch(), Ok(()), "it holds once it has sunk far enough");
+    assert!(arm.joints().expect("an answer").target(Joint::ALL[2]) > sinking.target(Joint::ALL[2]) + 3);
 }
 
 /// The line to the arm is interrupted on the way, for some seconds.

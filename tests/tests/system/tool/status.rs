@@ -192,16 +192,16 @@ fn d29_a_lost_supply_is_told_and_recover_asks_before_the_motors_go_on() {
 fn a_parked_arm_stays_and_its_own_pose_is_kept() {
     let rig = Rig::start();
     let text = failed(&rig.run(&["park", "_", "90", "65", "90", "90", "_", "_", "--keep"]), 1);
-    assert!(text.contains("joint 3 sank"), "a level forearm is no park pose: {text}");
+    assert!(text.contains("joint 3 sinks"), "a level forearm is no park pose: {text}");
     succeeded(rig.run(&["status"]));
     let first = succeeded(rig.run(&["park"]));
     assert!(first.starts_with("90.00 90.00 0."), "{first}");
     assert!(succeeded(rig.run(&["status"])).starts_with("motors damping protection"));
     succeeded(rig.run(&["state", "servo"]));
     // The example of `park --help`.
-    succeeded(rig.run(&["park", "_", "92", "2", "_", "50", "_", "_", "--keep"]));
+    succeeded(rig.run(&["park", "_", "95", "0", "_", "50", "_", "_", "--keep"]));
     succeeded(rig.run(&["state", "servo"]));
-    succeeded(rig.run(&["park", "100", "90", "2", "90", "50", "_", "_", "--keep"]));
+    succeeded(rig.run(&["park", "100", "95", "0", "90", "50", "_", "_", "--keep"]));
     succeeded(rig.run(&["state", "servo"]));
     let kept = succeeded(rig.run(&["park"]));
     let base: f64 = kept.split_whitespace().next().and_then(|angle| angle.parse().ok()).expect("an angle");
