@@ -44,8 +44,7 @@ impl Value {
             Arithmetic::Multiply => one * other,
             Arithmetic::Divide => one / other,
             Arithmetic::Power => one.powf(other),
-            // As in Python the result has the sign of the divisor.
-            Arithmetic::Remainder => one - other * (one / other).floor(),
+            Arithmetic::Remainder => remainder(one, other),
         })
     }
 
@@ -62,6 +61,12 @@ impl Value {
     }
 }
 
+/// As in Python, with the sign of the divisor.
+fn remainder(one: f64, other: f64) -> f64 {
+    let rest = one % other;
+    if rest != 0.0 && (rest < 0.0) != (other < 0.0) { rest + other } else { rest }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -74,6 +79,18 @@ mod tests {
     fn results_are_those_of_python_or_an_error() {
         assert_eq!(calculated(-7.0, Arithmetic::Remainder, 3.0), Ok(2.0));
         assert_eq!(calculated(7.0, Arithmetic::Remainder, -3.0), Ok(-2.0));
+        // Python 3 prints these.
+        for (one, other, rest) in [
+            (1.0, 0.1, 0.09999999999999995),
+            (-1.0, 0.1, 5.551115123125783e-17),
+            (5.5, -2.0, -0.5),
+            (-5.5, -2.0, -1.5),
+            (6.0, -3.0, 0.0),
+            (-1e-20, 3.0, 3.0),
+            (1e20, 3.0, 1.0),
+        ] {
+            assert_eq!(calculated(one, Arithmetic::Remainder, other), Ok(rest), "{one} % {other}");
+        }
         assert_eq!(calculated(2.0, Arithmetic::Power, 0.5), Ok(2.0_f64.sqrt()));
         for operation in [Arithmetic::Divide, Arithmetic::Remainder] {
             assert_eq!(calculated(1.0, operation, 0.0), Err(ProgramFault::NoNumber));
