@@ -35,11 +35,12 @@ impl PathProgress {
             self.last = None;
             return false;
         };
-        let from = self.last.replace(tip).unwrap_or(tip);
-        if distance(from, tip) > STEP * f64::from(MOST_STEPS) {
+        let is_near = |from: &Point| distance(*from, tip) <= STEP * f64::from(MOST_STEPS);
+        let from = self.last.replace(tip).filter(is_near);
+        if from.is_none() {
             self.passed = 0;
         }
-        between(from, tip).into_iter().any(|place| self.passes(place))
+        between(from.unwrap_or(tip), tip).into_iter().any(|place| self.passes(place))
     }
 
     fn passes(&mut self, place: Point) -> bool {
@@ -91,6 +92,19 @@ mod tests {
         assert!(follow(&CORNER));
         assert!(follow(&[&[[0.0, 150.0, 50.0]][..], &CORNER].concat()), "from elsewhere");
         assert!(follow(&[[1.0, 203.0, 52.0], [99.0, 202.0, 50.0], [101.0, 259.0, 47.0]]), "nearly");
+    }
+
+    #[test]
+    fn a_tip_that_leaps_begins_anew_where_it_is() {
+        let line = [[0.0, 200.0, 50.0], [150.0, 200.0, 50.0]];
+        let follows = |places: &[f64]| {
+            let mut progress = PathProgress::new(&line, 5.0);
+            places.iter().any(|x| progress.observe(Some([*x, 200.0, 50.0])))
+        };
+        assert!(follows(&[0.0, 90.0, 150.0]));
+        assert!(!follows(&[0.0, 150.0]), "nobody saw the way");
+        assert!(!follows(&[150.0, 0.0, 150.0]));
+        assert!(follows(&[150.0, 0.0, 90.0, 150.0]), "the start of the line is where it leapt to");
     }
 
     #[test]
