@@ -1,5 +1,7 @@
 //! What the arm measures, for an exercise.
 
+use arm_sim::Action;
+use arm_sim::scene::Scene;
 use arm_sim::world::{Object, World};
 use exercises::{Observation, SeenThing};
 use protocol_core::time::Instant;
@@ -7,6 +9,7 @@ use sevenbot::Snapshot;
 use sevenbot::map::BLOCKED_JOINTS;
 
 use crate::arm_state::ArmState;
+use crate::source::simulator::SimulatedSource;
 use crate::stop::since_start;
 
 /// What these registers of the arm say at `now`, and what is in its room.
@@ -20,6 +23,12 @@ pub fn observation(now: Instant, registers: &Snapshot, world: Option<&World>) ->
         blocked: registers.byte(&BLOCKED_JOINTS),
         things: world.map(seen_things).unwrap_or_default(),
     }
+}
+
+/// Does the actions of an exercise to an arm on an empty table, without the obstacles and faults of the exercise before.
+pub fn set_up(arm: &mut SimulatedSource, setup: Vec<Action>) {
+    let empty = [Action::Clear(None), Action::Drop, Action::Scene(Some(Scene::default()))];
+    empty.into_iter().chain(setup).for_each(|action| arm.act(action));
 }
 
 fn seen_things(world: &World) -> Vec<SeenThing> {
@@ -61,12 +70,29 @@ mod tests {
         for exercise in shipped() {
             let title = exercise.title.of("en");
             let (mut tab, mut attempt) = (Tab::new(), Attempt::new(&exercise));
-            exercise.setup.iter().for_each(|action| tab.act(action));
+            let setup = exercise.setup.iter().map(|action| action.parse().expect("an action"));
+            super::set_up(&mut tab.arm, setup.collect());
             let ends = solve(&mut tab, &mut attempt, &exercise.solution());
             assert_eq!(ends.last(), Some(&ProgramProgress::Over), "{title}: {ends:?}");
             let reached: Vec<_> = attempt.reached().collect();
             assert!(attempt.is_solved(), "{title}: {reached:?}");
         }
+    }
+
+    #[test]
+    fn nothing_is_left_of_the_exercise_before() {
+        let mut tab = Tab::new();
+        for action in ["fault 1=wall=115", "scene cube red 30 40 0 200"] {
+            tab.act(action);
+        }
+        assert_eq!(tab.observation().things.len(), 1);
+        super::set_up(&mut tab.arm, Vec::new());
+        let (address, values) =
+            crate::arm_state::target_frame(tab.client.registers(), 1, 150.0).expect("a target");
+        tab.client.write(tab.now(), address, &values);
+        tab.pass(120);
+        assert!(tab.observation().things.is_empty());
+        assert!((tab.angles()[0] - 150.0).abs() < 1.0, "no wall: {:?}", tab.angles());
     }
 
     #[test]

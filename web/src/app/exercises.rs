@@ -10,7 +10,7 @@ use web_sys::Element;
 use super::dom::{Dom, set_attribute, set_text};
 use super::files;
 use super::page::{App, Line};
-use crate::exercise::observation;
+use crate::exercise::{observation, set_up};
 
 impl App {
     /// Does what a button asks for. Returns whether it is one of exercises.
@@ -67,9 +67,7 @@ impl App {
             (Err(error), _) => {
                 return self.dom.notice(&format!("{} {error}", self.language.text("no-exercise")));
             }
-            (Ok(actions), Line::Simulated(source)) => {
-                actions.into_iter().for_each(|action| source.act(action))
-            }
+            (Ok(actions), Line::Simulated(source)) => set_up(source, actions),
             (Ok(actions), _) if actions.is_empty() => {}
             _ => return self.dom.notice(self.language.text("exercise-needs-simulation")),
         }
