@@ -22,6 +22,7 @@ const TEXTS = {
   code: ["class code", "课堂代码"],
   connecting: ["Connecting to the class …", "正在连接课堂……"],
   "connection-lost": ["The connection to `sevenbot class` was lost. Trying again …", "与 `sevenbot class` 的连接已断开，正在重试……"],
+  restarted: ["There is still no connection to `sevenbot class`. If it was started again, open the new address that it printed.", "与 `sevenbot class` 仍无连接。如果它已重新启动，请打开它显示的新地址。"],
   "not-sent": ["NOT SENT: there is no connection to `sevenbot class`. Try again when it is back.", "未发送：与 `sevenbot class` 没有连接。连接恢复后请重试。"],
   "bad-address": ["Open the address that `sevenbot class` printed: this one has no secret.", "请打开 `sevenbot class` 显示的地址：此地址不含密钥。"],
   full: ["There are too many teacher's screens. Close one, and load this page again.", "教师屏幕过多。请关闭一个，然后重新加载。"],
@@ -67,14 +68,26 @@ const TEXTS = {
 };
 const BAD = ["no_arm", "stop_failed", "blocked", "problem"];
 const RETRY_MS = 1000;
+// After so many attempts a class that has ended is more likely than an interrupted network.
+const MOST_REFUSED = 5;
 // The class tells news twice a second at least.
 const SILENCE_MS = 3000;
 
 const $ = id => document.getElementById(id);
-let language = (localStorage.getItem("language") ?? navigator.language).startsWith("zh") ? 1 : 0;
+// Where the browser blocks its storage, nothing is kept.
+const stored = act => {
+  try {
+    return act();
+  } catch {
+    return null;
+  }
+};
+let language = (stored(() => localStorage.getItem("language")) ?? navigator.language).startsWith("zh") ? 1 : 0;
 const text = name => TEXTS[name][language];
 let socket, welcome, shown;
 let drawn = 0;
+// Attempts to connect since the last connection.
+let refused = 0;
 
 // A screen reader reads a live text only when it changes.
 function setText(element, value) {
@@ -90,10 +103,10 @@ function notice(value) {
 function takeSecret() {
   const given = new URLSearchParams(location.search).get("token");
   if (given) {
-    sessionStorage.setItem("teacher", given);
+    stored(() => sessionStorage.setItem("teacher", given));
     history.replaceState(null, "", location.pathname);
   }
-  return sessionStorage.getItem("teacher");
+  return given ?? stored(() => sessionStorage.getItem("teacher"));
 }
 
 function connect(secret) {
@@ -110,7 +123,9 @@ function connect(secret) {
     own.close();
     shown = undefined;
     if (isFull) return;
-    setText($("state"), text(welcome ? "connection-lost" : "bad-address"));
+    refused += 1;
+    const lost = refused > MOST_REFUSED ? "restarted" : "connection-lost";
+    setText($("state"), text(welcome ? lost : "bad-address"));
     $("state").className = "bad";
     setTimeout(() => connect(secret), RETRY_MS);
   };
@@ -119,7 +134,10 @@ function connect(secret) {
     // A network that is gone closes nothing.
     silence = setTimeout(end, SILENCE_MS);
   };
-  socket.onopen = hear;
+  socket.onopen = () => {
+    refused = 0;
+    hear();
+  };
   socket.onmessage = event => {
     if (isOver) return;
     hear();
@@ -297,7 +315,7 @@ const ACTIONS = {
   "close-notice": () => notice(""),
   language: () => {
     language = 1 - language;
-    localStorage.setItem("language", ["en", "zh-CN"][language]);
+    stored(() => localStorage.setItem("language", ["en", "zh-CN"][language]));
     translate();
   },
 };
