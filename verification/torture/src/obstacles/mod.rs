@@ -9,6 +9,7 @@
 mod arm;
 mod grip;
 mod mishap;
+mod mishap_matrix;
 mod simulated;
 mod wall;
 
@@ -24,6 +25,7 @@ pub use wall::{WallCase, WallResult, push_against_wall};
 pub struct Experiments {
     walls: Vec<WallCase>,
     mishaps: &'static [Mishap],
+    matrix: Option<Vec<WallCase>>,
     grip_time: Duration,
 }
 
@@ -32,14 +34,15 @@ impl Experiments {
     #[must_use]
     pub fn all() -> Self {
         let grip_time = Duration::from_millis(3_600_000);
-        Self { walls: WallCase::all(), mishaps: &Mishap::ALL, grip_time }
+        let matrix = Some(WallCase::at_usual_speed());
+        Self { walls: WallCase::all(), mishaps: &Mishap::ALL, matrix, grip_time }
     }
 
     /// A few of them, which take some minutes in real time.
     #[must_use]
     pub fn few() -> Self {
         let grip_time = Duration::from_millis(60_000);
-        Self { walls: WallCase::few(), mishaps: &Mishap::SHORT_STOPS, grip_time }
+        Self { walls: WallCase::few(), mishaps: &Mishap::SHORT_STOPS, matrix: None, grip_time }
     }
 
     /// Makes these experiments, each with an arm of its own, and returns their tables.
@@ -49,6 +52,7 @@ impl Experiments {
     pub fn measure<A: ObstacleArm>(&self) -> Result<String, A::Error> {
         let walls = wall::tables::<A>(&self.walls)?;
         let mishaps = mishap::table::<A>(self.mishaps)?;
-        Ok(format!("{walls}\n{mishaps}\n{}", grip::table::<A>(self.grip_time)?))
+        let matrix = self.matrix.as_deref().map(mishap_matrix::tables::<A>).transpose()?.unwrap_or_default();
+        Ok(format!("{walls}\n{mishaps}\n{matrix}\n{}", grip::table::<A>(self.grip_time)?))
     }
 }

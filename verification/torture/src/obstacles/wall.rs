@@ -22,7 +22,7 @@ const POSES: [[u8; 6]; 8] = [
 ];
 /// The pose of the few cases.
 const FEW_POSE: [u8; 6] = POSES[0];
-const PAYLOADS_G: [u16; 3] = [0, 100, 300];
+
 const SPEEDS: [u8; 3] = [10, 60, 0];
 /// The wall is this far from the joint, and the target this far, in degrees.
 const WALL_DISTANCE: i16 = 8;
@@ -52,13 +52,16 @@ pub struct WallCase {
 }
 
 impl WallCase {
+    /// The payloads, in grams.
+    pub(super) const PAYLOADS_G: [u16; 3] = [0, 100, 300];
+
     /// Each joint but the claw in each pose, with each payload, at each speed, by a target and by a stream. From pose to pose
     /// and from speed to speed the wall changes its side.
     pub(super) fn all() -> Vec<Self> {
         let mut cases = Vec::new();
         for joint in Joint::ALL.into_iter().take(6) {
             for ((number, pose), payload_g) in
-                (0..).zip(POSES).flat_map(|pose| PAYLOADS_G.map(|grams| (pose, grams)))
+                (0..).zip(POSES).flat_map(|pose| Self::PAYLOADS_G.map(|grams| (pose, grams)))
             {
                 for (side, speed) in (number..).zip(SPEEDS) {
                     cases.extend([false, true].map(|is_streamed| Self {
@@ -85,6 +88,51 @@ impl WallCase {
                 && case.speed == 60
         };
         Self::all().into_iter().filter(is_among).collect()
+    }
+
+    /// Those at the usual speed, for what needs no wall.
+    pub(super) fn at_usual_speed() -> Vec<Self> {
+        Self::all().into_iter().filter(|case| case.speed == 60).collect()
+    }
+
+    pub(super) const fn joint(&self) -> Joint {
+        self.joint
+    }
+
+    pub(super) const fn payload_g(&self) -> u16 {
+        self.payload_g
+    }
+
+    /// True for one joint of each pose.
+    pub(super) fn is_of_its_pose(&self) -> bool {
+        let number = POSES.iter().position(|pose| *pose == self.pose);
+        number.is_some_and(|number| number % 6 == usize::from(self.joint.index()))
+    }
+
+    /// A new arm in the pose, whose joint can be driven.
+    pub(super) fn start<A: ObstacleArm>(&self, is_protected: bool) -> Result<A, A::Error> {
+        let mut arm: A = start(is_protected)?;
+        arm.plant().set_load(self.payload_g);
+        arm.write(TARGET_POSITION.address, &self.pose)?;
+        arm.run(SETTLE_TIME)?;
+        arm.write(SPEED.of(self.joint), &[self.speed])?;
+        if self.is_streamed {
+            arm.write(SET_POINT_PERIOD.address, &[PERIOD_MS, 0])?;
+        }
+        Ok(arm)
+    }
+
+    /// Drives the joint for this time.
+    pub(super) fn drive_for<A: ObstacleArm>(&self, arm: &mut A, time: Duration) -> Result<(), A::Error> {
+        let begun = arm.now();
+        self.drive(arm, Duration::ZERO)?;
+        while arm.now() - begun < time {
+            arm.run(Duration::from_millis(PERIOD_MS.into()))?;
+            if self.is_streamed {
+                self.drive(arm, arm.now() - begun)?;
+            }
+        }
+        Ok(())
     }
 
     /// This far from where the joint stands, in degrees, towards the wall.
@@ -185,16 +233,9 @@ pub fn push_against_wall<A: ObstacleArm>(
     case: &WallCase,
     is_protected: bool,
 ) -> Result<WallResult, A::Error> {
-    let mut arm: A = start(is_protected)?;
+    let mut arm: A = case.start(is_protected)?;
     let wall = case.wall();
-    arm.plant().set_load(case.payload_g);
-    arm.write(TARGET_POSITION.address, &case.pose)?;
-    arm.run(SETTLE_TIME)?;
     arm.plant().set_wall(case.joint, Some(Wall { millidegrees: wall, stiffness: None }));
-    arm.write(SPEED.of(case.joint), &[case.speed])?;
-    if case.is_streamed {
-        arm.write(SET_POINT_PERIOD.address, &[PERIOD_MS, 0])?;
-    }
     let mut result = case.push(&mut arm)?;
     arm.plant().set_wall(case.joint, None);
     let gone = arm.now();
