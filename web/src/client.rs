@@ -18,7 +18,7 @@ use sevenbot::traffic::Traffic;
 use sevenbot::{Snapshot, Span};
 
 use crate::arm_state::ArmState;
-use crate::stop::{Stop, StopProgress};
+use crate::stop::{Stop, StopProgress, hold_frames};
 
 /// A read without a reply is lost after 400 ms. A reply at 115,200 baud, through a server, takes a tenth of it.
 const PATIENCE: Patience = Patience { attempts: 2, timeout: Duration::from_millis(200) };
@@ -140,6 +140,23 @@ impl Client {
     pub fn stop(&mut self, now: Instant, speeds: Option<[u8; 7]>) {
         self.stop.start(Some(&self.registers).filter(|_| self.rounds > 0), speeds);
         self.continue_stop(now);
+    }
+
+    /// Lets every joint hold where it was read last, with these speeds. Nothing confirms it, so that other targets can follow at
+    /// once.
+    pub fn hold(&mut self, now: Instant, speeds: [u8; 7]) {
+        for (address, values) in hold_frames(&self.registers, speeds) {
+            self.write(now, address, &values);
+        }
+    }
+
+    /// As [`Self::hold`], before all that waits to be sent. Returns the last bytes for the arm: its line is closed behind them.
+    pub fn hold_and_leave(&mut self, now: Instant, speeds: [u8; 7]) -> Vec<u8> {
+        for (address, values) in hold_frames(&self.registers, speeds) {
+            self.link.write_ahead(Map::V22, address, &values);
+        }
+        self.advance(now);
+        std::mem::take(&mut self.to_send)
     }
 
     /// Takes bytes of the arm; none if its line is silent at `now`.

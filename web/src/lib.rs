@@ -20,6 +20,7 @@ pub mod class;
 pub mod client;
 mod confirmed;
 pub mod exercise;
+mod interruptions;
 pub mod movement;
 pub mod park;
 pub mod plots;

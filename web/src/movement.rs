@@ -32,7 +32,7 @@ const PERIOD: Duration = Duration::from_millis(50);
 const WATCHDOG: u8 = 50;
 /// After a movement the joints have this time to settle.
 const SETTLE_TIME: Duration = Duration::from_secs(2);
-const ALL_JOINTS: u8 = 0x7F;
+pub(crate) const ALL_JOINTS: u8 = 0x7F;
 
 /// Why a movement is not played.
 #[derive(Clone, Debug, PartialEq)]
@@ -160,17 +160,10 @@ impl Player {
         })
     }
 
-    /// Ends a movement that is played now. The registers before that one are restored at the end of this one.
+    /// Restores the speeds and times of these registers at the end.
     #[must_use]
-    pub fn instead_of(self, earlier: &Self, now: Instant, client: &mut Client) -> Self {
-        earlier.end(now, client);
-        Self { before: earlier.before.clone(), ..self }
-    }
-
-    /// Restores the speeds and times of these registers at the end, if there are any.
-    #[must_use]
-    pub fn restoring(self, before: Option<&Snapshot>) -> Self {
-        Self { before: before.unwrap_or(&self.before).clone(), ..self }
+    pub fn restoring(self, before: Snapshot) -> Self {
+        Self { before, ..self }
     }
 
     /// How much was played, from 0 to 1.
@@ -187,6 +180,12 @@ impl Player {
         }
     }
 
+    /// The registers before it.
+    #[must_use]
+    pub fn into_before(self) -> Snapshot {
+        self.before
+    }
+
     /// The speeds of the joints before it.
     #[must_use]
     pub fn speeds(&self) -> [u8; 7] {
@@ -198,7 +197,11 @@ impl Player {
         match self.advance(now, client) {
             Ok(progress) => progress,
             Err(failure) => {
-                self.end(now, client);
+                // The arm holds after a stop of another program, and does not take one of this program.
+                match &failure {
+                    PlayFailure::StoppedByAnother => self.close(now, client),
+                    _ => self.end(now, client),
+                }
                 PlayProgress::Failed(failure)
             }
         }
@@ -211,8 +214,16 @@ impl Player {
         }
     }
 
-    /// Later targets are approached by speed again. The arm stops at its last point.
+    /// Later targets are approached by speed again. The arm stops at its last point; one without streams is on its way to a
+    /// point at the speed of that point, so it holds where it is.
     pub fn end(&self, now: Instant, client: &mut Client) {
+        if !self.is_fine && matches!(self.stage, Stage::Way(_) | Stage::Path(_)) {
+            client.hold(now, self.speeds());
+        }
+        self.close(now, client);
+    }
+
+    fn close(&self, now: Instant, client: &mut Client) {
         if !matches!(self.stage, Stage::Start | Stage::Settling(_)) {
             write_all(&self.closing_frames(), now, client);
         }

@@ -1,15 +1,24 @@
 //! Parks the arm: goes to a pose in which friction holds it, switches the motors to damping, and watches whether it stays.
 //!
+//! ```text
+//!   Park: two rounds of reads ──▶ the way, pose by pose ──▶ let go ──▶ ParkProgress
+//!             └── motors off, a problem, a stop or a pause: ParkFailure, and the arm holds ──┘
+//! ```
+//!
 //! The way there and the limits are those of `sevenbot park`.
 
 use protocol_core::time::{Duration, Instant};
 use sevenbot::fine::FineTargets;
+use sevenbot::health::{Health, MoveFault, MoveWatch};
 use sevenbot::map::{MOTOR_STATE, SPEED, motor_state};
 use sevenbot::moves::park_way;
-use sevenbot::{FineAngle, Joint};
+use sevenbot::{FineAngle, Joint, Snapshot};
 
 use crate::arm_state::{ArmState, target_frame};
-use crate::client::Client;
+use crate::client::{BAUD, Client};
+use crate::interruptions::{Interruptions, ROUNDS_TO_KNOW};
+use crate::movement::{ALL_JOINTS, PlayFailure, start_anew};
+use crate::stop::since_start;
 
 /// 19 degrees per second.
 const SPEED_STEPS: u8 = 10;
@@ -23,102 +32,195 @@ const LONGEST_MOVE: Duration = Duration::from_micros(20_000_000);
 const WATCH_TIME: Duration = Duration::from_micros(2_000_000);
 
 /// How parking goes on or has ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum ParkProgress {
     /// It goes on.
     Moving,
     /// The arm is parked.
     Parked,
-    /// The arm did not get to the pose or did not stay there. It holds.
-    Failed,
+    /// It has ended before, for this reason.
+    Failed(ParkFailure),
+}
+
+/// Why the arm is not parked.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ParkFailure {
+    /// A joint is not measured yet. Nothing has moved.
+    NotMeasured,
+    /// The arm did not stay where it was let go. Its motors drive it again.
+    Sank,
+    /// The arm did not get there.
+    Move(PlayFailure),
+}
+
+impl From<PlayFailure> for ParkFailure {
+    fn from(failure: PlayFailure) -> Self {
+        Self::Move(failure)
+    }
+}
+
+impl From<MoveFault> for ParkFailure {
+    fn from(fault: MoveFault) -> Self {
+        Self::Move(PlayFailure::Arm(fault))
+    }
+}
+
+#[derive(Debug)]
+enum Stage {
+    Start,
+    /// It begins when this round was read.
+    Beginning(u64),
+    /// What is left of the way, the next part last. When that was sent, and how many complete rounds of reads there were then.
+    Way(Vec<FineTargets>, Option<(Instant, u64)>),
+    /// The angles and the time at which the arm was let go.
+    LetGo([f32; 7], Instant),
 }
 
 /// A park in progress.
 #[derive(Debug)]
 pub struct Park {
-    way: Vec<FineTargets>,
-    speeds: [u8; 7],
-    /// When the present part of the way was sent, and how many complete rounds of reads there were then.
-    sent: Option<(Instant, u64)>,
-    /// The angles and the time at which the arm was let go.
-    let_go: Option<([f32; 7], Instant)>,
+    /// The registers before it: speeds.
+    before: Snapshot,
+    stage: Stage,
+    interruptions: Interruptions,
+    watch: MoveWatch,
+    /// The last registers that were watched are those of this round.
+    watched_round: u64,
 }
 
 impl Park {
-    /// Begins at the present pose of the arm. `speeds`: the speed registers before it. `None` if a joint is not measured.
+    /// Begins. `before`: the registers with the speeds that the arm has afterwards.
     #[must_use]
-    pub fn new(state: &ArmState, speeds: [u8; 7]) -> Option<Self> {
-        let mut now = [FineAngle::from_hundredths(0)?; 7];
-        for (angle, measured) in now.iter_mut().zip(state.measured) {
-            *angle = FineAngle::from_degrees(f64::from(measured?))?;
+    pub fn new(before: Snapshot, now: Instant) -> Self {
+        Self {
+            before,
+            stage: Stage::Start,
+            interruptions: Interruptions::default(),
+            watch: MoveWatch::new(since_start(now), ALL_JOINTS, BAUD),
+            watched_round: 0,
         }
-        let mut way = park_way(None, now);
-        way.reverse();
-        Some(Self { way, speeds, sent: None, let_go: None })
     }
 
-    /// The speed registers before parking, to be written back afterwards.
+    /// The speeds before it.
     #[must_use]
-    pub const fn speeds(&self) -> [u8; 7] {
-        self.speeds
+    pub fn speeds(&self) -> [u8; 7] {
+        self.before.joints(&SPEED)
+    }
+
+    /// The registers before it.
+    #[must_use]
+    pub fn into_before(self) -> Snapshot {
+        self.before
+    }
+
+    /// Ends it, because something else moves the arm now. Joints that are on their way hold.
+    pub fn end(&self, now: Instant, client: &mut Client) {
+        if matches!(self.stage, Stage::Way(..)) {
+            client.hold(now, self.speeds());
+        }
     }
 
     /// Writes what is due.
     pub fn poll(&mut self, now: Instant, client: &mut Client) -> ParkProgress {
-        let state = client.state();
-        if let Some((start, since)) = self.let_go {
-            return self.watch(now, client, &state, start, since);
-        }
-        if !state.problems.is_empty() || state.motor_state != motor_state::SERVO {
-            client.write(now, SPEED.address, &self.speeds);
-            return ParkProgress::Failed;
-        }
-        match (self.sent, self.way.last()) {
-            (None, Some(targets)) => {
-                let frames = frames(client, targets);
-                client.write(now, SPEED.address, &[SPEED_STEPS; 7]);
-                for (address, values) in frames {
-                    client.write(now, address, &values);
+        match self.advance(now, client) {
+            Ok(progress) => progress,
+            Err(failure) => {
+                match (&self.stage, &failure) {
+                    // The arm holds then, and does not take a stop of this program.
+                    (Stage::Way(..), ParkFailure::Move(PlayFailure::StoppedByAnother)) => {
+                        client.write(now, SPEED.address, &self.speeds());
+                    }
+                    (Stage::Way(..), _) => client.stop(now, Some(self.speeds())),
+                    _ => {}
                 }
-                self.sent = Some((now, client.rounds()));
-            }
-            (Some((at, rounds)), Some(targets)) => {
-                // The next round may have been on its way before these targets.
-                if client.rounds() >= rounds + 2 && has_arrived(&state, targets) {
-                    self.way.pop();
-                    self.sent = None;
-                } else if now >= at + LONGEST_MOVE {
-                    client.write(now, SPEED.address, &self.speeds);
-                    return ParkProgress::Failed;
-                }
-            }
-            (_, None) => {
-                client.write(now, SPEED.address, &self.speeds);
-                client.write(now, MOTOR_STATE.address, &[motor_state::DAMPING]);
-                self.let_go = Some((state.angles(), now));
+                ParkProgress::Failed(failure)
             }
         }
-        ParkProgress::Moving
     }
 
-    fn watch(
-        &self,
-        now: Instant,
-        client: &mut Client,
-        state: &ArmState,
-        start: [f32; 7],
-        since: Instant,
-    ) -> ParkProgress {
-        let stays = start.iter().zip(state.angles()).all(|(before, after)| (before - after).abs() <= STAYS);
-        match (stays, now >= since + WATCH_TIME) {
-            (false, _) => {
-                client.write(now, MOTOR_STATE.address, &[motor_state::SERVO]);
-                ParkProgress::Failed
+    fn advance(&mut self, now: Instant, client: &mut Client) -> Result<ParkProgress, ParkFailure> {
+        match self.stage {
+            Stage::Start => {
+                start_anew(now, client);
+                self.stage = Stage::Beginning(client.rounds() + ROUNDS_TO_KNOW);
             }
-            (true, true) => ParkProgress::Parked,
-            (true, false) => ParkProgress::Moving,
+            Stage::LetGo(start, since) => return watch_parked(now, client, start, since),
+            _ => {}
         }
+        self.check(now, client)?;
+        let state = client.state();
+        match &mut self.stage {
+            Stage::Beginning(round) if client.rounds() >= *round => {
+                self.stage = Stage::Way(way(&state)?, None)
+            }
+            Stage::Way(way, sent) => match (*sent, way.last()) {
+                (None, Some(targets)) => {
+                    client.write(now, SPEED.address, &[SPEED_STEPS; 7]);
+                    for (address, values) in frames(client, targets) {
+                        client.write(now, address, &values);
+                    }
+                    *sent = Some((now, client.rounds()));
+                }
+                (Some((at, rounds)), Some(targets)) => {
+                    // The next round may have been on its way before these targets.
+                    if client.rounds() >= rounds + ROUNDS_TO_KNOW && has_arrived(&state, targets) {
+                        way.pop();
+                        *sent = None;
+                    } else if now >= at + LONGEST_MOVE {
+                        let away = Health::new(client.registers()).away_from_targets(ALL_JOINTS);
+                        return Err(PlayFailure::NotReached(away).into());
+                    }
+                }
+                (_, None) => {
+                    client.write(now, SPEED.address, &self.before.joints(&SPEED));
+                    client.write(now, MOTOR_STATE.address, &[motor_state::DAMPING]);
+                    self.stage = Stage::LetGo(state.angles(), now);
+                }
+            },
+            _ => {}
+        }
+        Ok(ParkProgress::Moving)
     }
+
+    /// Fails if the arm does not move as it should, or something interrupts it.
+    fn check(&mut self, now: Instant, client: &Client) -> Result<(), ParkFailure> {
+        self.interruptions.check_pause(now)?;
+        // The rounds of reads answer the questions.
+        self.watch.question(since_start(now))?;
+        let is_known = !matches!(self.stage, Stage::Beginning(round) if client.rounds() < round);
+        if is_known && client.rounds() != self.watched_round {
+            self.watched_round = client.rounds();
+            self.interruptions.check_stops(client.registers())?;
+            self.watch.registers(since_start(now), client.registers())?;
+        }
+        Ok(())
+    }
+}
+
+/// From where the joints are to the pose, in reverse.
+fn way(state: &ArmState) -> Result<Vec<FineTargets>, ParkFailure> {
+    let angle = |degrees: f32| FineAngle::from_degrees(f64::from(degrees));
+    let mut here = [FineAngle::from_hundredths(0).ok_or(ParkFailure::NotMeasured)?; 7];
+    for (here, measured) in here.iter_mut().zip(state.measured) {
+        *here = measured.and_then(angle).ok_or(ParkFailure::NotMeasured)?;
+    }
+    let mut way = park_way(None, here);
+    way.reverse();
+    Ok(way)
+}
+
+fn watch_parked(
+    now: Instant,
+    client: &mut Client,
+    start: [f32; 7],
+    since: Instant,
+) -> Result<ParkProgress, ParkFailure> {
+    let angles = client.state().angles();
+    if start.iter().zip(angles).any(|(before, after)| (before - after).abs() > STAYS) {
+        client.write(now, MOTOR_STATE.address, &[motor_state::SERVO]);
+        return Err(ParkFailure::Sank);
+    }
+    Ok(if now >= since + WATCH_TIME { ParkProgress::Parked } else { ParkProgress::Moving })
 }
 
 fn frames(client: &Client, targets: &FineTargets) -> Vec<(u8, Vec<u8>)> {
@@ -135,4 +237,114 @@ fn has_arrived(state: &ArmState, targets: &FineTargets) -> bool {
         state.angles().into_iter().zip(targets).filter_map(|(angle, target)| Some((angle, (*target)?)));
     let mut away = goals.map(|(angle, target)| (f64::from(angle) - target.degrees()).abs());
     state.moving == 0 && away.all(|degrees| degrees <= f64::from(ARRIVED))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stop::StopProgress;
+    use crate::tab::Tab;
+    use crate::texts::Language;
+    use crate::words::park_failure;
+
+    /// Parks until the end. `during` gets the number of each picture, and may break something.
+    fn park(tab: &mut Tab, mut during: impl FnMut(u32, &mut Tab)) -> ParkProgress {
+        let mut park = Park::new(tab.client.registers().clone(), tab.now());
+        for picture in 0..4_000 {
+            during(picture, tab);
+            match park.poll(tab.now(), &mut tab.client) {
+                ParkProgress::Moving => tab.pass(1),
+                end => return end,
+            }
+        }
+        panic!("it does not end: {park:?}");
+    }
+
+    #[test]
+    fn an_arm_is_parked_and_has_the_speeds_of_before() {
+        let mut tab = Tab::new();
+        let before = tab.registers();
+        assert_eq!(park(&mut tab, |_, _| ()), ParkProgress::Parked);
+        assert_eq!((tab.client.state().motor_state, tab.registers()), (motor_state::DAMPING, before));
+    }
+
+    #[test]
+    fn a_park_that_fails_says_why_and_the_joints_hold() {
+        for (action, word) in [
+            ("fault 1=missing", "Joint 1 does not answer"),
+            ("fault 3=stuck", "Joint 3 is blocked"),
+            ("fault supply=off", "does not answer"),
+            ("power-cycle", "restarted"),
+            ("halt", "does not answer"),
+        ] {
+            let mut tab = Tab::new();
+            let before = tab.registers();
+            let end = park(&mut tab, |picture, tab| {
+                if picture == 60 {
+                    tab.act(action);
+                }
+            });
+            let ParkProgress::Failed(failure) = end else { panic!("{action}: {end:?}") };
+            let words = park_failure(Language::English, &failure);
+            assert!(words.starts_with("Not parked:") && words.contains(word), "{action}: {words}");
+            assert_ne!(tab.client.stop_progress(), StopProgress::None, "{action}: the arm is told to hold");
+            tab.pass(60);
+            let held = tab.angles();
+            tab.pass(120);
+            if !matches!(action, "halt" | "fault supply=off") {
+                let moved = held.iter().zip(tab.angles()).map(|(held, end)| (held - end).abs());
+                assert!(moved.fold(0.0, f64::max) < 0.5, "{action}: {held:?} to {:?}", tab.angles());
+                assert_eq!(tab.registers(), before, "{action}");
+            }
+        }
+    }
+
+    #[test]
+    fn nothing_is_written_to_an_arm_that_cannot_be_parked() {
+        for (action, word) in
+            [("motors", "The motors are off."), ("fault 3=missing", "Joint 3 does not answer")]
+        {
+            let mut tab = Tab::new();
+            if action == "motors" {
+                tab.client.write(tab.now(), MOTOR_STATE.address, &[motor_state::FORCELESS]);
+            } else {
+                tab.act(action);
+            }
+            tab.pass(60);
+            let written = tab.client.frames().count();
+            let ParkProgress::Failed(failure) = park(&mut tab, |_, _| ()) else { panic!("{action}") };
+            let words = park_failure(Language::English, &failure);
+            assert!(words.contains(word), "{action}: {words}");
+            assert_eq!(tab.client.frames().count(), written, "{action}");
+        }
+    }
+
+    #[test]
+    fn a_page_that_pauses_ends_its_park() {
+        let mut tab = Tab::new();
+        let end = park(&mut tab, |picture, tab| {
+            if picture == 60 {
+                (0..200).for_each(|_| tab.arm.advance(10_000.0, || true));
+            }
+        });
+        assert!(matches!(end, ParkProgress::Failed(ParkFailure::Move(PlayFailure::Paused(_)))), "{end:?}");
+    }
+
+    #[test]
+    fn a_park_that_something_else_ends_leaves_no_joint_that_goes_on() {
+        let mut tab = Tab::new();
+        let before = tab.registers();
+        let mut park = Park::new(tab.client.registers().clone(), tab.now());
+        for _ in 0..90 {
+            assert_eq!(park.poll(tab.now(), &mut tab.client), ParkProgress::Moving);
+            tab.pass(1);
+        }
+        assert_ne!(tab.client.state().moving, 0);
+        let at_end = tab.angles();
+        park.end(tab.now(), &mut tab.client);
+        tab.pass(120);
+        let moved = at_end.iter().zip(tab.angles()).map(|(end, now)| (end - now).abs());
+        assert!(moved.fold(0.0, f64::max) < 2.0, "{at_end:?} to {:?}", tab.angles());
+        assert_eq!(tab.registers(), before);
+    }
 }

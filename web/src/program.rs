@@ -17,10 +17,7 @@ mod failure;
 mod joint_move;
 mod sensor;
 
-use std::time::Duration;
-
 use block_programs::{BlockId, Event, Interpreter, Program};
-use host_link::sharing::SharingState;
 use protocol_core::time::Instant;
 use sevenbot::Snapshot;
 use sevenbot::health::MoveWatch;
@@ -31,15 +28,12 @@ pub use failure::ProgramFailure;
 
 use crate::client::{BAUD, Client};
 use crate::confirmed::{Confirmed, write_all};
+use crate::interruptions::{Interruptions, ROUNDS_TO_KNOW};
 use crate::movement::{PlayFailure, start_anew};
 use crate::stop::since_start;
 
 /// So many blocks begin in one call at most. An endless loop goes on in the next call.
 const BLOCKS_PER_POLL: u32 = 200;
-/// After a longer pause of the page the program is over: a person may rely on an arm that has stopped.
-const LONGEST_PAUSE: Duration = Duration::from_secs(1);
-/// The reads of the present round may be older than a write, those of the next one are not.
-const ROUNDS_TO_KNOW: u64 = 2;
 
 /// How a program goes on or has ended.
 #[derive(Clone, Debug, PartialEq)]
@@ -78,9 +72,7 @@ pub struct ProgramRun {
     watch: MoveWatch,
     /// The last registers that were watched are those of this round.
     watched_round: u64,
-    last_poll: Option<Instant>,
-    /// The stops of all programs before it, as a server counts them; the inner `None` without a server.
-    stops: Option<Option<u8>>,
+    interruptions: Interruptions,
 }
 
 impl ProgramRun {
@@ -96,8 +88,7 @@ impl ProgramRun {
             before: registers.clone(),
             watch: MoveWatch::new(since_start(now), 0, BAUD),
             watched_round: 0,
-            last_poll: None,
-            stops: None,
+            interruptions: Interruptions::default(),
         }
     }
 
@@ -141,10 +132,14 @@ impl ProgramRun {
         self.hold(now, client);
     }
 
-    /// Ends the program, because something else moves the arm now. A move of joints that has begun is not stopped.
+    /// Ends the program, because something else moves the arm now. Joints that are on their way hold: with the speeds of before they
+    /// would go on, and faster (D11).
     pub fn end(self, now: Instant, client: &mut Client) {
+        if self.action.may_move() {
+            client.hold(now, self.before.joints(&SPEED));
+        }
         if let Action::Line(player) = &self.action {
-            player.end(now, client);
+            player.end_stream(now, client);
         }
         write_all(&self.closing_frames(), now, client);
     }
@@ -172,7 +167,7 @@ impl ProgramRun {
     }
 
     fn advance(&mut self, now: Instant, client: &mut Client) -> Result<ProgramProgress, ProgramFailure> {
-        self.check_pause(now)?;
+        self.interruptions.check_pause(now).map_err(ProgramFailure::Arm)?;
         match self.action {
             Action::Start => {
                 start_anew(now, client);
@@ -185,23 +180,11 @@ impl ProgramRun {
         self.run_blocks(now, client)
     }
 
-    fn check_pause(&mut self, now: Instant) -> Result<(), ProgramFailure> {
-        let last = self.last_poll.replace(now).unwrap_or(now);
-        let pause = since_start(now).saturating_sub(since_start(last));
-        if pause > LONGEST_PAUSE { Err(ProgramFailure::Arm(PlayFailure::Paused(pause))) } else { Ok(()) }
-    }
-
     /// Fails if the arm does not do what the program wants, or another program has stopped it.
     fn watch(&mut self, now: Instant, client: &Client) -> Result<(), ProgramFailure> {
         if client.rounds() != self.watched_round {
             self.watched_round = client.rounds();
-            let sharing = SharingState::of(client.registers());
-            // A server drops the targets of a program that streamed. One that waits for its joints sees the count of stops.
-            let stops = sharing.map(|sharing| sharing.stops);
-            let is_stopped = sharing.is_some_and(|sharing| sharing.is_stopped);
-            if is_stopped || *self.stops.get_or_insert(stops) != stops {
-                return Err(ProgramFailure::Arm(PlayFailure::StoppedByAnother));
-            }
+            self.interruptions.check_stops(client.registers()).map_err(ProgramFailure::Arm)?;
             self.watch.registers(since_start(now), client.registers())?;
         }
         // The rounds of reads answer the questions.

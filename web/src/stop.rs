@@ -5,6 +5,7 @@ use std::time::Duration;
 use protocol_core::time::Instant;
 use sevenbot::Snapshot;
 use sevenbot::hold::{HeldJoints, Hold, HoldStep};
+use sevenbot::map::SPEED;
 
 /// Addresses and their values.
 type Frames = Vec<(u8, Vec<u8>)>;
@@ -78,6 +79,16 @@ impl Stop {
         }
         Vec::new()
     }
+}
+
+/// What lets the joints of these registers hold without a confirmation, and then gives them these speeds.
+pub(crate) fn hold_frames(registers: &Snapshot, speeds: [u8; 7]) -> Frames {
+    let frames = match Hold::at_once(Some(&HeldJoints::of(registers))).poll(Duration::ZERO) {
+        HoldStep::Write(frames) => frames,
+        // The motors are off.
+        _ => Frames::new(),
+    };
+    frames.into_iter().chain([(SPEED.address, speeds.to_vec())]).collect()
 }
 
 /// The time since the start of the page's clock.

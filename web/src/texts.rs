@@ -163,10 +163,11 @@ const TEXTS: &[(&str, &str, &str)] = &[
         "机械臂正在移动到停放姿态，然后松开。",
     ),
     ("parked", "Parked: the motors are off, and the arm stays.", "已停放：电机已关闭，机械臂保持不动。"),
+    ("park-failed", "Not parked:", "停放失败："),
     (
-        "park-failed",
-        "Not parked: the arm did not get there or did not stay, so it holds.",
-        "停放失败：机械臂未到达或未能保持，现已保持不动。",
+        "park-sank",
+        "a joint sank when it was let go, so the motors drive the arm again.",
+        "松开后有关节下沉，电机已重新驱动机械臂。",
     ),
     ("recording", "Movements", "动作"),
     (
@@ -448,6 +449,11 @@ const TEXTS: &[(&str, &str, &str)] = &[
         "class-not-joined",
         "The class cannot be reached, or the class code is not right.",
         "无法连接课堂，或课堂代码不正确。",
+    ),
+    (
+        "class-stop-not-sent",
+        "NOT SENT: there is no connection to the class. Call the teacher, or switch the arm off.",
+        "未发送：与课堂没有连接。请叫老师，或关闭机械臂电源。",
     ),
     ("class-lost", "The connection to the class was lost. Trying again …", "与课堂的连接已断开，正在重试……"),
     ("teacher-says", "The teacher:", "老师："),

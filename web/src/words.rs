@@ -7,6 +7,7 @@ use sevenbot::{Joint, ProblemKind};
 
 use crate::arm_state::{ArmState, misplaced};
 use crate::movement::PlayFailure;
+use crate::park::ParkFailure;
 use crate::program::ProgramFailure;
 use crate::stop::StopProgress;
 use crate::texts::Language;
@@ -142,6 +143,17 @@ fn play_reason(language: Language, failure: &PlayFailure) -> String {
             format!("{} {}", language.text("not-reached"), numbers(away.iter().map(|(joint, ..)| *joint)))
         }
     }
+}
+
+/// Why the arm is not parked.
+#[must_use]
+pub fn park_failure(language: Language, failure: &ParkFailure) -> String {
+    let reason = match failure {
+        ParkFailure::NotMeasured => language.text("starting").to_owned(),
+        ParkFailure::Sank => language.text("park-sank").to_owned(),
+        ParkFailure::Move(failure) => play_reason(language, failure),
+    };
+    format!("{} {reason}", language.text("park-failed"))
 }
 
 /// Why a program of blocks ended early.

@@ -1,8 +1,7 @@
 //! What a person does: clicks, keys, sliders, the pointer on the picture, files.
 
 use arm_sim::scene::Scene;
-use protocol_core::time::Instant;
-use sevenbot::map::{FINE_TARGET, MOTOR_STATE, SPEED, TARGET_POSITION, motor_state};
+use sevenbot::map::{FINE_TARGET, MOTOR_STATE, TARGET_POSITION, motor_state};
 use sevenbot::{Span, register_values};
 use wasm_bindgen::{JsCast, JsValue};
 use web_sys::{Element, Event, HtmlDialogElement, HtmlInputElement, KeyboardEvent};
@@ -15,10 +14,7 @@ use super::panels::TIP_FIELDS;
 use super::programs;
 use super::storage;
 use crate::arm_state::target_frame;
-use crate::movement::{PlayProgress, Player};
-use crate::park::{Park, ParkProgress};
 use crate::plots::Quantity;
-use crate::words;
 
 /// The texts of the tour, in their order. The last one is for a real arm.
 pub(super) const TOUR: [&str; 5] = ["tour-1", "tour-2", "tour-3", "tour-4", "tour-5"];
@@ -100,7 +96,6 @@ impl App {
         if self.refuses_to_drive() {
             return;
         }
-        self.park = None;
         let now = self.now();
         // A target would be one point of the stream of a movement, and the next point would lead back.
         let moves = [MOTOR_STATE, TARGET_POSITION, FINE_TARGET].iter().any(|row| row.holds(address));
@@ -109,14 +104,6 @@ impl App {
             self.end_movement();
         }
         self.client.write(now, address, values);
-    }
-
-    /// Ends a movement that is played, or a program. Returns the speed registers before it, which the arm has again soon.
-    pub(super) fn end_movement(&mut self) -> Option<[u8; 7]> {
-        let program = self.end_program().map(|before| before.joints(&SPEED));
-        let (Some(player), now) = (self.player.take(), self.now()) else { return program };
-        player.end(now, &mut self.client);
-        Some(player.speeds())
     }
 
     /// Where the wall is, in degrees.
@@ -137,56 +124,6 @@ impl App {
             (1..).zip(state.targets).filter(|(joint, _)| state.stalled >> (joint - 1) & 1 == 1)
         {
             self.send_joint(joint, target);
-        }
-    }
-
-    fn begin_park(&mut self) {
-        self.show_time_line(None);
-        let speeds = self.end_movement().unwrap_or_else(|| self.client.registers().joints(&SPEED));
-        self.park = Park::new(&self.client.state(), speeds);
-        let text = if self.park.is_some() { "parking" } else { "park-failed" };
-        self.dom.notice(self.language.text(text));
-    }
-
-    /// Goes on with parking.
-    pub(super) fn park_on(&mut self, now: Instant) {
-        let Some(mut park) = self.park.take() else { return };
-        let text = match park.poll(now, &mut self.client) {
-            ParkProgress::Moving => {
-                self.park = Some(park);
-                return;
-            }
-            ParkProgress::Parked => "parked",
-            ParkProgress::Failed => "park-failed",
-        };
-        self.dom.notice(self.language.text(text));
-    }
-
-    /// Goes on with a movement.
-    pub(super) fn play_on(&mut self, now: Instant) {
-        let Some(mut player) = self.player.take() else { return };
-        match player.poll(now, &mut self.client) {
-            PlayProgress::Playing => self.player = Some(player),
-            PlayProgress::Played => {}
-            PlayProgress::Failed(failure) => {
-                self.dom.notice(&words::play_failure(self.language, &failure));
-            }
-        }
-    }
-
-    pub(super) fn stop(&mut self) {
-        if self.refuses_to_drive() {
-            return;
-        }
-        let now = self.now();
-        if self.stop_program(now) {
-            return;
-        }
-        let (park, player) = (self.park.take(), self.player.take());
-        let speeds = park.map(|park| park.speeds()).or(player.as_ref().map(Player::speeds));
-        self.client.stop(now, speeds);
-        if let Some(player) = player {
-            player.end_stream(now, &mut self.client);
         }
     }
 

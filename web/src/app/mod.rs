@@ -10,9 +10,9 @@
 //!   dom.rs, storage.rs, kept_recording.rs ──▶ page.rs ──▶ panels.rs, hand.rs, recording.rs, ──▶ controls.rs
 //!   (the browser's elements and storage)     (App)      time_line.rs (what it shows,         (numbers and
 //!                                                        pointers, movements)                 buttons)
-//!                ──▶ picture.rs, events.rs, connection.rs, exports.rs ──▶ mod.rs
-//!                    (before each picture; clicks and keys; which          (start)
-//!                     arm it is; tests)
+//!                ──▶ picture.rs, events.rs, movements.rs, connection.rs, exports.rs ──▶ mod.rs
+//!                    (before each picture; clicks and keys; what moves the arm by        (start)
+//!                     itself; which arm it is; tests)
 //! ```
 
 mod class;
@@ -29,6 +29,7 @@ mod exports;
 mod files;
 mod hand;
 mod kept_recording;
+mod movements;
 mod page;
 mod panels;
 mod picture;

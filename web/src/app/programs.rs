@@ -3,7 +3,6 @@
 use block_programs::{Program, ProgramError, python};
 use protocol_core::time::Instant;
 use sevenbot::Snapshot;
-use sevenbot::map::SPEED;
 use wasm_bindgen::prelude::Closure;
 use wasm_bindgen::{JsCast, JsValue};
 use wasm_bindgen_futures::{JsFuture, spawn_local};
@@ -171,17 +170,6 @@ impl App {
                 self.dom.end_notice();
             }
         }
-    }
-
-    /// Ends what moves the arm now. Returns the registers with the speeds and times of before that.
-    fn registers_before_movement(&mut self) -> Snapshot {
-        let parked = self.park.take().map(|park| park.speeds());
-        let speeds = self.end_movement().or(parked);
-        let mut registers = self.client.registers().clone();
-        if let Some(speeds) = speeds {
-            registers.put(&Snapshot { address: SPEED.address, values: speeds.to_vec() });
-        }
-        registers
     }
 
     /// Goes on with the program.

@@ -39,7 +39,6 @@ impl App {
     }
 
     pub(super) fn begin_play(&mut self) {
-        self.park = None;
         let Some(recording) = &self.recording else { return self.say_that_nothing_is_recorded() };
         let seconds = self.dom.get::<HtmlInputElement>("approach").ok().and_then(|field| number(&field));
         let approach = seconds.filter(|seconds| *seconds > 0.0);
@@ -48,11 +47,8 @@ impl App {
         match Player::new(&recording.text, self.client.registers(), approach, now) {
             Ok(player) => {
                 self.show_time_line(None);
-                let before = self.end_program();
-                self.player = Some(match self.player.take() {
-                    Some(earlier) => player.instead_of(&earlier, now, &mut self.client),
-                    None => player.restoring(before.as_ref()),
-                });
+                let before = self.registers_before_movement();
+                self.player = Some(player.restoring(before));
                 self.dom.end_notice();
             }
             Err(PlayRefusal::NoRecording(why)) => self.refuse_file(&why),

@@ -91,6 +91,30 @@ fn a_program_ends_where_the_arm_does_not_carry_it_out() {
     }
 }
 
+/// The joint turns at 20 degrees/s, and would turn at 114 with the speed of before (D11).
+#[test]
+fn d11_a_joint_on_its_way_holds_when_another_joint_is_moved() {
+    let mut tab = Tab::new();
+    let before = tab.registers();
+    let mut run = tab.begin(&long_move(), Pace::Running);
+    for _ in 0..60 {
+        assert_eq!(run.poll(tab.arm.now(), &mut tab.client), ProgramProgress::Running);
+        tab.pass(1);
+    }
+    let at_end = tab.angles()[0];
+    run.end(tab.arm.now(), &mut tab.client);
+    let (address, values) =
+        crate::arm_state::target_frame(tab.client.registers(), 5, 120.0).expect("a target");
+    tab.client.write(tab.arm.now(), address, &values);
+    for _ in 0..120 {
+        tab.pass(1);
+        let now = tab.angles()[0];
+        assert!((at_end - now).abs() < 2.0, "from {at_end} to {now}");
+    }
+    assert!((tab.angles()[4] - 120.0).abs() < 1.0, "{:?}", tab.angles());
+    assert_eq!(tab.registers(), before);
+}
+
 /// A joint that another program moves is where that one wants it, not where this one does.
 #[test]
 fn a_move_does_not_count_as_done_if_something_else_moves_its_joint() {

@@ -133,6 +133,35 @@ fn park_or_another_movement_ends_one_that_is_played_and_restores_its_speeds() {
 }
 
 #[test]
+fn what_moves_no_joint_leaves_a_park_and_what_ends_it_restores_the_speeds() {
+    let viewed = Viewed::without_arm();
+    let mut page = viewed.open();
+    let before = settings(&mut page);
+    page.evaluate(
+        "['park', 'pump', 'park'].forEach(name => document.querySelector(`[data-action=${name}]`).click())",
+    );
+    page.wait_for_text("#notice", "Parked: the motors are off");
+    assert_eq!(settings(&mut page), before, "the second park knows the speeds before the first one");
+    assert_eq!(page.state()["registers"][31], 1, "the pump is on");
+    page.click("[data-action=park]");
+    page.wait_for_text("#notice", "Not parked: The motors are off.");
+    page.click("[data-action=motors][data-value='1']");
+    page.wait_until_ready();
+    page.type_into("#target-3", "60");
+    page.wait_until_joint_rests(3, 60.0);
+    page.click("[data-action=record]");
+    page.click("[data-action=park]");
+    page.wait_for_state("the arm is parked slowly", |state| state["registers"][34] == 10);
+    page.focus("#joint-1");
+    page.keys("ArrowRight", 10);
+    page.wait_until_joint_rests(1, 95.0);
+    assert_eq!((settings(&mut page), page.text("#notice")), (before, String::new()));
+    assert!(page.target(3) > 5.0, "joint 3 was held on its way to 0: {}", page.target(3));
+    page.choose("#source", "simulator");
+    page.wait_for_text("#recording", "recorded: ");
+}
+
+#[test]
 fn a_stop_of_another_program_ends_a_movement_that_is_played() {
     let viewed = Viewed::with_arm();
     let mut page = viewed.open();

@@ -1,0 +1,83 @@
+//! What moves the arm by itself: a park or a movement that is played goes on, and one of these or a program ends. One moves at a time.
+
+use protocol_core::time::Instant;
+use sevenbot::Snapshot;
+
+use super::page::App;
+use crate::movement::{PlayProgress, Player};
+use crate::park::{Park, ParkProgress};
+use crate::words;
+
+impl App {
+    /// Ends what moves the arm: a park, a movement that is played, or a program. Returns the registers before it: the arm has their
+    /// speeds and times again soon.
+    pub(super) fn end_movement(&mut self) -> Option<Snapshot> {
+        let now = self.now();
+        if let Some(park) = self.take_park() {
+            park.end(now, &mut self.client);
+            return Some(park.into_before());
+        }
+        if let Some(player) = self.player.take() {
+            player.end(now, &mut self.client);
+            return Some(player.into_before());
+        }
+        self.end_program()
+    }
+
+    /// The park in progress, which ends, and its notice with it.
+    fn take_park(&mut self) -> Option<Park> {
+        let park = self.park.take()?;
+        self.dom.end_notice_of(self.language.text("parking"));
+        Some(park)
+    }
+
+    /// Ends what moves the arm now. Returns the registers with the speeds and times of before that.
+    pub(super) fn registers_before_movement(&mut self) -> Snapshot {
+        self.end_movement().unwrap_or_else(|| self.client.registers().clone())
+    }
+
+    pub(super) fn begin_park(&mut self) {
+        self.show_time_line(None);
+        let before = self.registers_before_movement();
+        self.park = Some(Park::new(before, self.now()));
+        self.dom.notice(self.language.text("parking"));
+    }
+
+    /// Goes on with parking.
+    pub(super) fn park_on(&mut self, now: Instant) {
+        let Some(mut park) = self.park.take() else { return };
+        match park.poll(now, &mut self.client) {
+            ParkProgress::Moving => self.park = Some(park),
+            ParkProgress::Parked => self.dom.notice(self.language.text("parked")),
+            ParkProgress::Failed(failure) => self.dom.notice(&words::park_failure(self.language, &failure)),
+        }
+    }
+
+    /// Goes on with a movement.
+    pub(super) fn play_on(&mut self, now: Instant) {
+        let Some(mut player) = self.player.take() else { return };
+        match player.poll(now, &mut self.client) {
+            PlayProgress::Playing => self.player = Some(player),
+            PlayProgress::Played => {}
+            PlayProgress::Failed(failure) => {
+                self.dom.notice(&words::play_failure(self.language, &failure));
+            }
+        }
+    }
+
+    pub(super) fn stop(&mut self) {
+        if self.refuses_to_drive() {
+            return;
+        }
+        let now = self.now();
+        if self.stop_program(now) {
+            return;
+        }
+        let (park, player) = (self.take_park(), self.player.take());
+        let speeds = park.map(|park| park.speeds()).or(player.as_ref().map(Player::speeds));
+        self.client.stop(now, speeds);
+        if let Some(player) = player {
+            player.end_stream(now, &mut self.client);
+        }
+    }
+}
