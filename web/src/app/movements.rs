@@ -1,11 +1,14 @@
 //! What moves the arm by itself: a park or a movement that is played goes on, and one of these or a program ends. One moves at a time.
 
+use host_link::sharing::{DrivenBy, SharingState};
 use protocol_core::time::Instant;
 use sevenbot::Snapshot;
+use sevenbot::map::SPEED;
 
 use super::page::App;
 use crate::movement::{PlayProgress, Player};
 use crate::park::{Park, ParkProgress};
+use crate::stop::StopProgress;
 use crate::words;
 
 impl App {
@@ -78,6 +81,21 @@ impl App {
         self.client.stop(now, speeds);
         if let Some(player) = player {
             player.end_stream(now, &mut self.client);
+        }
+    }
+
+    /// Before the line to the arm ends: what moves the arm ends, and joints that are on their way hold. Those that another program
+    /// moves go on. Nothing can confirm it any more, so the speeds follow at once.
+    pub(super) fn leave_arm(&mut self) {
+        let is_own = self.programs.run.is_some() || self.player.is_some() || self.park.is_some();
+        let before = self.registers_before_movement();
+        let is_of_another = SharingState::of(self.client.registers())
+            .is_some_and(|sharing| sharing.driven_by == DrivenBy::Another);
+        let moves = is_own || (self.client.state().moving != 0 && !is_of_another);
+        // A stop was written already, and holds the joints with other speeds.
+        if moves && self.client.stop_progress() != StopProgress::Verifying {
+            let bytes = self.client.hold_and_leave(self.now(), before.joints(&SPEED));
+            self.send(&bytes);
         }
     }
 }

@@ -255,7 +255,7 @@ impl App {
         let now = self.now();
         self.play(now);
         let bytes = self.client.poll(now);
-        self.line.source().send(&bytes);
+        self.send(&bytes);
         if let Line::Simulated(source) = &mut self.line {
             source.advance(virtual_ms * 1e3, || browser_now() < until);
         }
@@ -311,12 +311,12 @@ impl App {
 
     /// As [`Self::set_line`], with what is known of the arm. Returns the last one.
     pub(super) fn swap_line(&mut self, line: (Line, Client)) -> (Line, Client) {
+        self.end_recording();
+        self.leave_arm();
         let before = (std::mem::replace(&mut self.line, line.0), std::mem::replace(&mut self.client, line.1));
         (self.shown_round, self.slid_round) = (0, 0);
         (self.hand, self.unreachable) = (None, None);
         self.is_end_told = false;
-        (self.recorder, self.player, self.park) = (None, None, None);
-        self.programs.run = None;
         self.exercises.end();
         self.show_time_line(None);
         self.history = History::new(PLOT_SECONDS);
@@ -324,6 +324,10 @@ impl App {
         self.dom.set_hidden("simulator", !is_simulated);
         self.dom.end_notice();
         before
+    }
+
+    pub(super) fn send(&mut self, bytes: &[u8]) {
+        self.line.source().send(bytes);
     }
 
     pub(super) fn line_state(&mut self) -> LineState {
