@@ -12,6 +12,7 @@ use super::storage;
 use crate::class::{Activity, Membership, report, stop_of_the_real_arm};
 use crate::client::Client;
 use crate::program::ProgramRun;
+use crate::source::LineState;
 use crate::source::socket::SocketSource;
 
 /// Time between two attempts to connect again, in milliseconds.
@@ -45,10 +46,16 @@ impl App {
             "join-class" => self.join_class(),
             "rename" => self.leave_class(),
             "close-class-text" => self.dom.set_hidden("class-text-row", true),
-            "stop-class-arm" => self.class.iter().for_each(|class| class.send(&stop_of_the_real_arm())),
+            "stop-class-arm" => self.stop_class_arm(),
             _ => return false,
         }
         true
+    }
+
+    fn stop_class_arm(&self) {
+        if !self.class.as_ref().is_some_and(|class| class.send(&stop_of_the_real_arm())) {
+            self.dom.notice(self.language.text("class-stop-not-sent"));
+        }
     }
 
     fn field(&self, id: &str) -> String {
@@ -90,13 +97,15 @@ impl App {
     /// With each picture: connects again, and says that the arm has stopped.
     pub(super) fn class_on(&mut self, time: f64) {
         let Some(class) = &mut self.class else { return };
-        if class.socket.as_ref().is_some_and(ClassSocket::is_closed) {
+        if class.is_lost(time) {
             class.socket = None;
             self.class_ended(time);
         }
+        self.reconnect_real_arm(time);
         let Some(class) = &mut self.class else { return };
         if class.retry.is_some_and(|retry| retry <= time) {
             class.retry = None;
+            class.hear();
             class.socket = ClassSocket::connect(
                 &class.code,
                 || {
@@ -125,12 +134,16 @@ impl App {
 
     fn greet_class(&self) {
         let Some(class) = &self.class else { return };
-        class.member.iter().for_each(|member| class.send(&member.hello()));
+        if let Some(member) = &class.member {
+            class.send(&member.hello());
+        }
     }
 
     /// A message came.
     fn hear_class(&mut self, text: &str) {
-        let member = self.class.as_mut().and_then(|class| class.member.as_mut());
+        let Some(class) = &mut self.class else { return };
+        class.hear();
+        let member = class.member.as_mut();
         match member.and_then(|member| member.receive(text)) {
             None => {}
             Some(ToPupil::Stop { .. }) => self.stop_for_teacher(),
@@ -191,7 +204,9 @@ impl App {
         let progress = self.client.stop_progress();
         let Some(class) = &mut self.class else { return };
         let confirmation = class.member.as_mut().and_then(|member| member.confirmation(progress));
-        confirmation.into_iter().for_each(|text| class.send(&text));
+        if let Some(text) = confirmation {
+            class.send(&text);
+        }
     }
 
     /// Tells the class how the arm does.
@@ -208,7 +223,9 @@ impl App {
             all: count(attempt.reached().count()),
         });
         let report = report(&self.client, activity, goals, self.dom.0.hidden());
-        self.class.iter().for_each(|class| class.send(&report));
+        if let Some(class) = &self.class {
+            class.send(&report);
+        }
     }
 
     /// The class tells who has the real arm.
@@ -249,6 +266,21 @@ impl App {
         self.set_aside.get_or_insert(before);
         self.dom.choose("source", "server");
         self.dom.notice(self.language.text("arm-begins"));
+    }
+
+    /// Connects to the real arm again if only this connection has ended, until the class says that another one has the arm.
+    fn reconnect_real_arm(&mut self, time: f64) {
+        let is_driven = self.set_aside.is_some() && self.dom.choice("source") == "server";
+        let is_closed = is_driven && matches!(self.line_state(), LineState::Closed(_));
+        let Some(class) = &mut self.class else { return };
+        let Some(query) = class.arm_query().filter(|_| is_closed) else { return class.arm_retry = None };
+        if *class.arm_retry.get_or_insert(time + RETRY_MS) > time {
+            return;
+        }
+        class.arm_retry = None;
+        if let Ok(source) = SocketSource::connect_with(&query) {
+            self.set_line(Line::Remote(Box::new(source)));
+        }
     }
 
     /// The page has its simulated arm again. `text`: why.

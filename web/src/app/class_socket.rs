@@ -47,11 +47,9 @@ impl ClassSocket {
         self.is_closed.get()
     }
 
-    /// Sends a message. A failure closes the socket.
-    pub(super) fn send(&self, text: &str) {
-        if self.socket.ready_state() == WebSocket::OPEN {
-            let _ = self.socket.send_with_str(text);
-        }
+    /// Sends a message. Returns whether the socket took it. A failure closes the socket.
+    pub(super) fn send(&self, text: &str) -> bool {
+        self.socket.ready_state() == WebSocket::OPEN && self.socket.send_with_str(text).is_ok()
     }
 }
 

@@ -5,6 +5,11 @@ use classroom::LentArm;
 use super::class_socket::ClassSocket;
 use crate::class::Membership;
 
+/// The class asks a tab that does not answer each 8 s, and others more often.
+const SILENCE_MS: f64 = 10_000.0;
+/// The most that one picture adds to a silence, in milliseconds.
+const LONGEST_PICTURE_MS: f64 = 1_000.0;
+
 /// A tab in a class, or one that wants to join it.
 #[derive(Default)]
 pub(super) struct ClassTab {
@@ -13,6 +18,10 @@ pub(super) struct ClassTab {
     pub(super) socket: Option<ClassSocket>,
     /// When to connect again, in the browser's milliseconds.
     pub(super) retry: Option<f64>,
+    /// For how long the class has said nothing while the page drew pictures, in milliseconds, and the time of the last picture.
+    silence: (f64, f64),
+    /// When to connect to the real arm again.
+    pub(super) arm_retry: Option<f64>,
     pub(super) code: String,
     pub(super) name: String,
     /// The class's real arm, as the class told last.
@@ -26,7 +35,21 @@ impl ClassTab {
         self.member.as_ref()?.key().filter(|_| is_own).map(|key| format!("?token={key}"))
     }
 
-    pub(super) fn send(&self, text: &str) {
-        self.socket.iter().for_each(|socket| socket.send(text));
+    /// Returns whether the message is on its way.
+    pub(super) fn send(&self, text: &str) -> bool {
+        self.socket.as_ref().is_some_and(|socket| socket.send(text))
+    }
+
+    /// The class said something, or a connection to it begins.
+    pub(super) const fn hear(&mut self) {
+        self.silence.0 = 0.0;
+    }
+
+    /// Has the connection ended? A network that is gone closes nothing. `time`: of this picture.
+    pub(super) fn is_lost(&mut self, time: f64) -> bool {
+        let (silence, last) = self.silence;
+        // A tab in the background gets no pictures, and may get the messages after the next one.
+        self.silence = (silence + (time - last).clamp(0.0, LONGEST_PICTURE_MS), time);
+        self.socket.as_ref().is_some_and(|socket| socket.is_closed() || silence > SILENCE_MS)
     }
 }

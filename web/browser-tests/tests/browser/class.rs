@@ -173,6 +173,43 @@ fn the_real_arm_is_given_driven_and_taken_back() {
     }
 }
 
+/// Keeps the WebSockets of the page in `window.sockets`.
+const KEEP_SOCKETS: &str = "
+    window.sockets = [];
+    window.WebSocket = class extends WebSocket {
+      constructor(...given) { super(...given); window.sockets.push(this); }
+    };";
+
+/// The last WebSocket of the page to this path.
+fn socket(path: &str) -> String {
+    format!("window.sockets.filter(socket => socket.url.includes('{path}')).at(-1)")
+}
+
+#[test]
+fn a_line_to_the_real_arm_that_breaks_is_opened_again_and_a_class_that_falls_silent_is_noticed() {
+    let class = ClassRun::start(true);
+    let mut teacher = class.open_teacher();
+    let mut mia = class.join_after(&teacher, "Mia", KEEP_SOCKETS);
+    wait_for_tile(&mut teacher, "Mia", ".doing", "ready");
+    click_tile(&mut teacher, "Mia");
+    mia.wait_for_text("#class-arm", "You have the class's real arm for");
+    mia.wait_until_ready();
+    let frames = socket("/frames");
+    mia.evaluate(&format!("{frames}.close()"));
+    mia.wait_until_said("#state", "The connection to the arm has ended.");
+    mia.wait_until_ready();
+    assert_eq!(mia.evaluate(&format!("{frames}.readyState")), 1, "the line is open");
+    mia.wait_for_text("#class-arm", "You have the class's real arm for");
+    // As with a network that is gone: nothing arrives, and nothing is closed.
+    let of_class = socket("/class");
+    mia.evaluate(&format!("(window.silent = {of_class}).onmessage = null"));
+    mia.wait_until_said("#notice", "The connection was lost, so you have the class's real arm no longer.");
+    mia.wait_for_text("#class-state", "You are in the class as Mia");
+    assert!(mia.evaluate("window.silent.readyState").as_u64() >= Some(2), "it is closed");
+    assert_eq!(mia.evaluate("document.querySelector('#source').value"), "simulator");
+    assert_eq!(mia.errors(), [""; 0]);
+}
+
 /// Measures a stop for all while thirty arms move.
 #[test]
 #[ignore = "ten minutes"]
