@@ -2,11 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use browser_tests::page::{DARK, DESKTOP, PHONE};
 use browser_tests::{Page, Viewed};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
-use serde_json::json;
 use system_tests::wait::wait_for;
 
 /// The state of the last block that is lit.
