@@ -197,11 +197,7 @@ impl Player {
         match self.advance(now, client) {
             Ok(progress) => progress,
             Err(failure) => {
-                // The arm holds after a stop of another program, and does not take one of this program.
-                match &failure {
-                    PlayFailure::StoppedByAnother => self.close(now, client),
-                    _ => self.end(now, client),
-                }
+                self.end(now, client);
                 PlayProgress::Failed(failure)
             }
         }
@@ -214,16 +210,8 @@ impl Player {
         }
     }
 
-    /// Later targets are approached by speed again. The arm stops at its last point; one without streams is on its way to a
-    /// point at the speed of that point, so it holds where it is.
+    /// Later targets are approached by speed again. The arm stops at its last point, which is at most 50 ms ahead.
     pub fn end(&self, now: Instant, client: &mut Client) {
-        if !self.is_fine && matches!(self.stage, Stage::Way(_) | Stage::Path(_)) {
-            client.hold(now, self.speeds());
-        }
-        self.close(now, client);
-    }
-
-    fn close(&self, now: Instant, client: &mut Client) {
         if !matches!(self.stage, Stage::Start | Stage::Settling(_)) {
             write_all(&self.closing_frames(), now, client);
         }

@@ -96,3 +96,29 @@ pub(crate) fn hold_frames(registers: &Snapshot, speeds: [u8; 7]) -> Frames {
 pub const fn since_start(now: Instant) -> Duration {
     Duration::from_micros(now.as_micros())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::arm_state::target_frame;
+    use crate::source::Source;
+    use crate::tab::Tab;
+
+    #[test]
+    fn an_arm_that_is_left_holds_and_has_its_speeds() {
+        let mut tab = Tab::new();
+        let (address, values) = target_frame(tab.client.registers(), 1, 175.0).expect("a target");
+        tab.client.write(tab.now(), address, &values);
+        tab.pass(20);
+        let (at_end, speeds) = (tab.angles()[0], tab.client.registers().joints(&SPEED));
+        let bytes = tab.client.hold_and_leave(tab.now(), speeds);
+        tab.arm.send(&bytes);
+        // Nobody reads the line.
+        (0..200).for_each(|_| tab.arm.advance(10_000.0, || true));
+        let left = tab.angles()[0];
+        assert!(at_end < 140.0 && (at_end - left).abs() < 10.0, "from {at_end} to {left}");
+        tab.client = crate::client::Client::default();
+        tab.pass(60);
+        assert_eq!(tab.client.registers().joints(&SPEED), speeds);
+    }
+}

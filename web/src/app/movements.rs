@@ -39,7 +39,19 @@ impl App {
         self.end_movement().unwrap_or_else(|| self.client.registers().clone())
     }
 
+    /// Is a stop on its way? It gives the joints other speeds until it is confirmed, so nothing that restores the present ones begins.
+    pub(super) fn is_stopping(&self) -> bool {
+        let is_stopping = self.client.stop_progress() == StopProgress::Verifying;
+        if is_stopping {
+            self.dom.notice(self.language.text("stopping"));
+        }
+        is_stopping
+    }
+
     pub(super) fn begin_park(&mut self) {
+        if self.is_stopping() {
+            return;
+        }
         self.show_time_line(None);
         let before = self.registers_before_movement();
         self.park = Some(Park::new(before, self.now()));

@@ -14,7 +14,6 @@ use super::files;
 use super::page::{App, with_app};
 use super::storage;
 use crate::program::{Pace, ProgramProgress, ProgramRun};
-use crate::stop::StopProgress;
 use crate::words;
 
 /// The name of the program in the browser's storage.
@@ -155,8 +154,8 @@ impl App {
             run.go_on(pace);
             return self.show_time_line(None);
         }
-        if self.client.stop_progress() == StopProgress::Verifying {
-            return self.dom.notice(self.language.text("stopping"));
+        if self.is_stopping() {
+            return;
         }
         match Program::parse(&self.programs.text) {
             Err(error) => self.show_program_error(&error),

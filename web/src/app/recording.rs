@@ -39,6 +39,9 @@ impl App {
     }
 
     pub(super) fn begin_play(&mut self) {
+        if self.is_stopping() {
+            return;
+        }
         let Some(recording) = &self.recording else { return self.say_that_nothing_is_recorded() };
         let seconds = self.dom.get::<HtmlInputElement>("approach").ok().and_then(|field| number(&field));
         let approach = seconds.filter(|seconds| *seconds > 0.0);
