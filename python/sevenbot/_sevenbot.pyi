@@ -67,8 +67,9 @@ _T = TypeVar("_T")
 _Numbers = TypeVar("_Numbers", NDArray[float32], NDArray[float64])
 
 class Error(Exception):
-    """A failure of this package. `hints` is a tuple of texts: what to try, the most likely cause first."""
+    """A failure of this package. `hints` is a tuple of texts: what to try, the most likely cause first. `recording` is what `Arm.record` had recorded before it, or `None`."""
     hints: tuple[str, ...]
+    recording: Recording | None
 
 class PortError(Error):
     """The port cannot be opened, has no arm, or failed."""
@@ -446,7 +447,7 @@ class Arm:
         self, seconds: float | None = None, *, hz: int = 30, guided: bool = False
     ) -> Recording:
         """Records the positions for `seconds`, 0 to 86400, or until Ctrl-C, `hz` times a second, 1 to 50. Raises `Interrupted` if
-        another thread calls `stop()`.
+        another thread calls `stop()`. An exception has what was recorded until then as its `recording`.
 
         With `guided` the motors go off, so that you can guide the arm by hand: it falls unless you hold it. At the end it
         holds where it is.

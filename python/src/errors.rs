@@ -24,6 +24,7 @@ macro_rules! exceptions {
         pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
             let py = module.py();
             py.get_type::<Error>().setattr("hints", PyTuple::empty(py))?;
+            py.get_type::<Error>().setattr("recording", py.None())?;
             py.get_type::<ArmProblem>().setattr("problems", PyTuple::empty(py))?;
             py.get_type::<ArmProblem>().setattr("joints", PyTuple::empty(py))?;
             $(module.add(stringify!($name), py.get_type::<$name>())?;)*
@@ -33,7 +34,7 @@ macro_rules! exceptions {
 }
 
 exceptions! {
-    Error(PyException): "A failure of this package. `hints` is a tuple of texts: what to try, the most likely cause first.";
+    Error(PyException): "A failure of this package. `hints` is a tuple of texts: what to try, the most likely cause first. `recording` is what `Arm.record` had recorded before it, or `None`.";
     PortError(Error): "The port cannot be opened, has no arm, or failed.";
     NoAnswer(PortError): "The arm does not answer.";
     NotTaken(Error): "The arm did not take a value. The message tells why.";

@@ -212,12 +212,23 @@ pub(crate) struct Recorded {
     pub(crate) arrivals: Vec<f64>,
 }
 
-/// Records until the time is over or a signal of Python ends it.
+/// Records until the time is over or a signal of Python ends it. A failure leaves what was recorded before it.
 pub(crate) fn record(
     arm: &mut Arm,
     options: RecordOptions,
     watch: &mut Watch<'_>,
-) -> Result<Recorded, MoveError> {
+) -> (Recorded, Result<(), MoveError>) {
+    let mut done = Recorded::default();
+    let outcome = record_into(&mut done, arm, options, watch);
+    (done, outcome)
+}
+
+fn record_into(
+    done: &mut Recorded,
+    arm: &mut Arm,
+    options: RecordOptions,
+    watch: &mut Watch<'_>,
+) -> Result<(), MoveError> {
     let RecordOptions { hz, is_guided, .. } = options;
     let before = arm.joints()?;
     if is_guided {
@@ -229,25 +240,26 @@ pub(crate) fn record(
         if arm.joints()?.has_restarted_since(&before) {
             return Err(MoveError::Problems(vec![Problem::of_arm(ProblemKind::Restarted)]));
         }
-        record_reports(arm, options, content, watch)
+        record_reports(done, arm, options, content, watch)
     });
     if is_guided {
         // The targets become the measured positions (D13).
         let held = arm.engage_and_watch();
-        return recorded.and_then(|recorded| held.map(|()| recorded));
+        return recorded.and(held);
     }
     recorded
 }
 
 fn record_reports(
+    done: &mut Recorded,
     arm: &mut Arm,
     options: RecordOptions,
     content: u8,
     watch: &mut Watch<'_>,
-) -> Result<Recorded, MoveError> {
+) -> Result<(), MoveError> {
     let vacuum = arm.read_span(Span::of(&VACUUM_PUMP))?.byte(&VACUUM_PUMP) != 0;
     let mut lines = RecordingLines::new(FileVersion::Hundredths);
-    let mut done = Recorded { text: lines.head(), arrivals: Vec::new() };
+    done.text = lines.head();
     let mut recorder = Recorder::new(arm, options.hz, content);
     let mut first = None;
     while watch.goes_on() {
@@ -260,7 +272,7 @@ fn record_reports(
         done.arrivals.extend(line.is_some().then(|| (pose.received - first).as_secs_f64()));
         done.text.extend(line);
     }
-    if watch.is_stopped() { Err(MoveError::Interrupted) } else { Ok(done) }
+    if watch.is_stopped() { Err(MoveError::Interrupted) } else { Ok(()) }
 }
 
 /// How a recording is played.

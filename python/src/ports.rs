@@ -8,13 +8,16 @@ use sevenbot::ports::{ProbeResult, probe, reachable};
 use crate::arguments::{PortName, baud_rate, whole};
 use crate::errors::{InvalidType, InvalidValue, PortError, error};
 
+/// Name, description, number, firmware and chip.
+type Found = (String, String, u8, String, String);
+
 /// The arms of this machine: port, description, device id (register 11), firmware version and `chip_id`. Their ports are serial
 /// ports, or servers of this user (`sevenbot serve`).
 ///
 /// Asks all ports at the same time, at `baud` bits per second, for about half a second.
 #[pyfunction]
 #[pyo3(signature = (baud = 115_200))]
-pub(crate) fn ports(py: Python<'_>, baud: i64) -> PyResult<Vec<(String, String, u8, String, String)>> {
+pub(crate) fn ports(py: Python<'_>, baud: i64) -> PyResult<Vec<Found>> {
     let baud = baud_rate(py, baud)?;
     let found = py.detach(|| probe(reachable(), baud));
     let arms = found.into_iter().filter_map(|found| {

@@ -345,6 +345,15 @@ def test_a_stopped_sample_and_a_stopped_recording_say_so(simulated_arm: sevenbot
     assert isinstance(sampled, sevenbot.Interrupted)
     recorded = stopped(simulated_arm, lambda: simulated_arm.record(80_000))
     assert isinstance(recorded, sevenbot.Interrupted)
+    assert recorded.recording is not None and len(recorded.recording) > 10, "nothing is lost"
+
+
+def test_a_recording_that_fails_late_keeps_what_it_has(simulated_arm: sevenbot.SimulatedArm) -> None:
+    simulated_arm.simulation.later(2, "fault 3=missing")
+    with pytest.raises(sevenbot.ArmProblem, match="joint 3") as failed:
+        simulated_arm.record(10, hz=50)
+    assert failed.value.recording is not None
+    assert 1.5 < failed.value.recording.duration < 5
 
 
 def test_an_arm_can_be_read_while_another_thread_waits_for_it(simulated_arm: sevenbot.SimulatedArm) -> None:

@@ -103,12 +103,18 @@ impl Arm {
     /// Records until the time is over, or a signal of Python ends a recording without a limit.
     pub(super) fn record_moments(&self, py: Python<'_>, options: RecordOptions) -> PyResult<Recording> {
         let work = move |arm: &mut sevenbot::Arm, watch: &mut Watch<'_>| motion::record(arm, options, watch);
-        let (recorded, signal) = self.worker.call_until_signal(py, work)?;
-        if let Some(signal) = signal.filter(|_| options.limit.is_some()) {
-            return Err(signal);
+        let ((Recorded { text, arrivals }, outcome), signal) = self.worker.call_until_signal(py, work)?;
+        let failure = signal.filter(|_| options.limit.is_some()).or(raised(py, outcome).err());
+        let has_moments = !arrivals.is_empty();
+        let recording = || Recording::of_text(py, &text).map(|recording| recording.with_arrivals(arrivals));
+        match failure {
+            None => recording(),
+            Some(failure) if !has_moments => Err(failure),
+            Some(failure) => {
+                failure.value(py).setattr("recording", recording()?)?;
+                Err(failure)
+            }
         }
-        let Recorded { text, arrivals } = raised(py, recorded)?;
-        Ok(Recording::of_text(py, &text)?.with_arrivals(arrivals))
     }
 
     /// Makes a moving arm hold, and closes the port.
