@@ -8,7 +8,9 @@ use crate::stop_all::PendingStop;
 
 /// Time between two questions to a tab that answers.
 const ASK_PERIOD: Duration = Duration::from_millis(250);
-/// A tab that has not answered for this long counts as silent. Then it is asked again.
+/// A tab that does not answer is asked again after this time. It takes a silence of 10 s for a dead connection.
+const ASK_AGAIN: Duration = Duration::from_millis(4_000);
+/// A tab that has not answered for this long counts as silent.
 const SILENT: Duration = Duration::from_millis(8_000);
 
 #[derive(Debug)]
@@ -107,7 +109,7 @@ impl Pupil {
     /// Time passes.
     pub(crate) fn poll(&mut self, now: Instant) {
         let since = now - self.asked;
-        self.is_ask_due |= since >= if self.waits_for_answer { SILENT } else { ASK_PERIOD };
+        self.is_ask_due |= since >= if self.waits_for_answer { ASK_AGAIN } else { ASK_PERIOD };
     }
 
     /// Has it to be told something? `message`: the number of the teacher's last message.
