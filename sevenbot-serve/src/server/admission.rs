@@ -2,7 +2,7 @@
 //!
 //! If all places before the token are taken, the oldest connection there loses its place to the next one. So connections that
 //! send nothing do not keep out a client that sends its token at once. Wrong tokens make the next ones of the same address
-//! wait. While there are more connections than places, no other one is accepted: each takes file descriptors.
+//! wait, one after the other. While there are more connections than places, no other one is accepted: each takes file descriptors.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::net::IpAddr;
@@ -18,6 +18,8 @@ const WAYS_IN: usize = 3;
 /// The first wait after a wrong token; each further one doubles it.
 const FIRST_WAIT: Duration = Duration::from_millis(100);
 const LONGEST_WAIT: Duration = Duration::from_secs(2);
+/// Connections of one address that may wait for the check of their tokens. More are refused.
+const MOST_WAITING: u32 = 16;
 /// Addresses with wrong tokens that are remembered.
 const MOST_ADDRESSES: usize = 256;
 
@@ -56,6 +58,32 @@ struct WrongTokens {
     count: u32,
     /// The next token from this address is not checked before this time.
     next: Instant,
+    /// Connections that wait for that.
+    waiting: u32,
+}
+
+impl WrongTokens {
+    fn wait(self) -> Duration {
+        FIRST_WAIT.saturating_mul(1 << self.count.saturating_sub(1).min(10)).min(LONGEST_WAIT)
+    }
+}
+
+/// Too many connections of an address wait for the check of their tokens.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct TooManyWait;
+
+/// A connection that waits for the check of its token, until it is dropped.
+struct Turn<'a> {
+    admission: &'a Admission,
+    address: IpAddr,
+}
+
+impl Drop for Turn<'_> {
+    fn drop(&mut self) {
+        if let Some(wrong) = lock(&self.admission.wrong).get_mut(&self.address) {
+            wrong.waiting = wrong.waiting.saturating_sub(1);
+        }
+    }
 }
 
 impl Admission {
@@ -117,12 +145,36 @@ impl Admission {
         Arc::clone(&self.reserved).try_acquire_owned().ok()
     }
 
-    /// Waits as long as the wrong tokens of this address make it wait.
-    pub(super) async fn wait(&self, address: Option<IpAddr>) {
-        let known = address.and_then(|address| lock(&self.wrong).get(&address).copied());
-        if let Some(WrongTokens { next, .. }) = known {
+    /// Waits as long as the wrong tokens of this address make it wait. The caller then checks its token, and notes the outcome.
+    pub(super) async fn wait(&self, address: Option<IpAddr>) -> Result<(), TooManyWait> {
+        let Some(address) = address else { return Ok(()) };
+        let turn = {
+            let mut wrong = lock(&self.wrong);
+            let Some(wrong) = wrong.get_mut(&address) else { return Ok(()) };
+            if wrong.waiting >= MOST_WAITING {
+                return Err(TooManyWait);
+            }
+            wrong.waiting += 1;
+            Turn { admission: self, address }
+        };
+        while let Some(next) = self.take_turn(address) {
             tokio::time::sleep_until(next.into()).await;
         }
+        drop(turn);
+        Ok(())
+    }
+
+    /// The next check of a token of this address is that of the caller, unless another one has just taken it. Returns until when to
+    /// wait then.
+    fn take_turn(&self, address: IpAddr) -> Option<Instant> {
+        let mut wrong = lock(&self.wrong);
+        let wrong = wrong.get_mut(&address)?;
+        let now = Instant::now();
+        if now < wrong.next {
+            return Some(wrong.next);
+        }
+        wrong.next = now + wrong.wait();
+        None
     }
 
     /// Notes whether the token of this address was right.
@@ -137,9 +189,9 @@ impl Admission {
             wrong.clear();
         }
         let now = Instant::now();
-        let entry = wrong.entry(address).or_insert(WrongTokens { count: 0, next: now });
-        let wait = FIRST_WAIT.saturating_mul(1 << entry.count.min(10)).min(LONGEST_WAIT);
-        *entry = WrongTokens { count: entry.count.saturating_add(1), next: now + wait };
+        let entry = wrong.entry(address).or_insert(WrongTokens { count: 0, next: now, waiting: 0 });
+        entry.count = entry.count.saturating_add(1);
+        entry.next = now + entry.wait();
     }
 }
 
@@ -178,6 +230,38 @@ mod tests {
                 ended = silent.iter().filter(|task| task.is_finished()).count();
             }
             assert_eq!(lock(&admission.unknown).len(), MOST - 1);
+        });
+    }
+
+    /// All of them connect at once.
+    #[test]
+    fn wrong_tokens_of_one_address_are_checked_one_after_the_other() {
+        run(async {
+            let admission = Admission::new(MOST);
+            let address: IpAddr = "10.0.0.1".parse().unwrap();
+            admission.note(Some(address), false);
+            let start = Instant::now();
+            let guesses: Vec<_> = (0..200)
+                .map(|_| {
+                    let admission = Arc::clone(&admission);
+                    tokio::spawn(async move {
+                        let turn = admission.wait(Some(address)).await;
+                        turn.inspect(|()| admission.note(Some(address), false)).is_ok()
+                    })
+                })
+                .collect();
+            tokio::time::sleep(Duration::from_millis(650)).await;
+            // After 0.1, 0.3, and 0.7 s.
+            assert!(lock(&admission.wrong).get(&address).unwrap().count <= 3, "{:?}", start.elapsed());
+            let refused = guesses.iter().filter(|guess| guess.is_finished()).count();
+            assert!((184..=187).contains(&refused), "{refused}: the others wait");
+            assert_eq!(admission.wait(Some("10.0.0.2".parse().unwrap())).await, Ok(()), "another address");
+            guesses.iter().for_each(tokio::task::JoinHandle::abort);
+            while lock(&admission.wrong).get(&address).unwrap().waiting > 0 {
+                tokio::task::yield_now().await;
+            }
+            admission.note(Some(address), true);
+            assert_eq!(admission.wait(Some(address)).await, Ok(()));
         });
     }
 

@@ -9,7 +9,7 @@ use tokio::io::AsyncReadExt;
 use tokio::net::{TcpListener, TcpStream};
 use tokio_rustls::TlsAcceptor;
 
-use super::admission::Admission;
+use super::admission::{Admission, TooManyWait};
 use super::breakage::Breakage;
 use super::byte_connection::{self, ByteStream, First, NoFrames};
 use super::listener::accept_tcp;
@@ -111,7 +111,10 @@ impl ByteServer {
                 break (line.as_slice(), &[][..], since);
             }
         };
-        self.admission.wait(Some(peer.ip())).await;
+        if self.admission.wait(Some(peer.ip())).await == Err(TooManyWait) {
+            self.notices.send(Notice::Refused { peer: Some(peer), reason: RefusalReason::Full });
+            return None;
+        }
         let is_right = is_equal(given.strip_suffix(b"\r").unwrap_or(given), token.as_bytes());
         self.admission.note(Some(peer.ip()), is_right);
         if !is_right {

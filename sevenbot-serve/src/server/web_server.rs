@@ -24,7 +24,7 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio_rustls::TlsAcceptor;
 use tower_http::compression::Compression;
 
-use super::admission::{Admission, Place};
+use super::admission::{Admission, Place, TooManyWait};
 use super::answer::{Answer, Protocol, refusal};
 use super::breakage::Breakage;
 use super::byte_connection::ByteStream;
@@ -139,8 +139,10 @@ impl WebServer {
     ) -> Response<Full<Bytes>> {
         let since = self.shared.earliest();
         // The files are public: only what needs the token waits for it.
-        if !self.site.is_public(&request) {
-            self.admission.wait(Some(peer.ip())).await;
+        if !self.site.is_public(&request) && self.admission.wait(Some(peer.ip())).await == Err(TooManyWait) {
+            self.refused(peer, RefusalReason::Full);
+            let text = "Too many wrong tokens came from your address. Try again in a minute.\n";
+            return refusal(StatusCode::TOO_MANY_REQUESTS, text);
         }
         let (response, protocol) = match self.site.answer(&request) {
             Answer::Whole(response) => {
