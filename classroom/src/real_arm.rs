@@ -11,6 +11,8 @@ use crate::stop_all::PendingStop;
 pub struct ArmNews {
     /// It answers.
     pub answers: bool,
+    /// What is sent to it may reach it, although it perhaps does not answer.
+    pub may_hear: bool,
     /// It is being held.
     pub is_holding: bool,
     /// It has confirmed the last hold.
@@ -66,10 +68,10 @@ impl RealArm {
 
     /// Has it to be held now? It is, from then on.
     pub(crate) fn take_hold(&mut self, now: Instant) -> bool {
-        let ArmNews { answers, is_holding, .. } = self.news;
+        let ArmNews { may_hear, is_holding, .. } = self.news;
         // A new stop does not wait for the end of an older one.
         let is_wanted =
-            |hold: &&mut PendingStop| answers && hold.is_due(now) && !(is_holding && hold.was_sent);
+            |hold: &&mut PendingStop| may_hear && hold.is_due(now) && !(is_holding && hold.was_sent);
         let Some(hold) = self.hold.as_mut().filter(is_wanted) else { return false };
         hold.sent(now);
         self.news = ArmNews { is_holding: true, holds: false, ..self.news };

@@ -12,7 +12,8 @@ use protocol_core::time::{Duration, Instant};
 
 const REPORT: Report =
     Report { points: Some([[0, 200, 100]; POINTS]), doing: Doing::Ready, goals: None, is_hidden: false };
-const ANSWERS: ArmNews = ArmNews { answers: true, is_holding: false, holds: false, is_limp: false };
+const ANSWERS: ArmNews =
+    ArmNews { answers: true, may_hear: true, is_holding: false, holds: false, is_limp: false };
 const HOLDS: ArmNews = ArmNews { holds: true, ..ANSWERS };
 
 /// A class, and its clock.
@@ -250,15 +251,30 @@ fn tabs_are_asked_one_question_at_a_time_and_silent_ones_are_shown() {
     let (mia, _) = lesson.join("Mia");
     lesson.pass(250);
     assert_eq!(lesson.hear_all(mia), [ToPupil::Ask { arm: None, over: None }]);
-    lesson.pass(7_000);
+    lesson.pass(3_900);
     assert_eq!(lesson.hear_all(mia), [], "the question is not answered yet");
     assert_eq!(lesson.tile("Mia").presence, Presence::Here);
-    lesson.pass(1_000);
+    lesson.pass(4_100);
     assert_eq!(lesson.tile("Mia").presence, Presence::Silent);
     assert_eq!(lesson.hear_all(mia).len(), 1, "asked again");
     lesson.say(mia, &FromPupil::Report(REPORT));
     let tile = lesson.tile("Mia");
     assert_eq!((tile.presence, tile.report), (Presence::Here, Some(REPORT)));
+}
+
+/// The page takes a silence of 10 s for a dead connection.
+#[test]
+fn a_tab_that_does_not_answer_is_asked_every_four_seconds() {
+    let mut lesson = Lesson::new(false);
+    let (mia, _) = lesson.join("Mia");
+    let mut asked = Vec::new();
+    for _ in 0..600 {
+        lesson.pass(50);
+        asked.extend(lesson.hear_all(mia).into_iter().map(|_| lesson.now));
+    }
+    assert!(asked.len() >= 7, "{asked:?}");
+    let longest = asked.windows(2).map(|pair| pair[1] - pair[0]).max();
+    assert_eq!(longest, Some(Duration::from_millis(4_000)), "{asked:?}");
 }
 
 #[test]
@@ -375,7 +391,10 @@ fn the_real_arm_counts_in_a_stop_and_is_held_until_it_confirms() {
     assert!(lesson.class.take_hold(lesson.now), "it ended without a confirmation");
     lesson.class.arm_news(lesson.now, ArmNews::default());
     lesson.pass(1_000);
-    assert!(!lesson.class.take_hold(lesson.now), "nothing answers");
+    assert!(!lesson.class.take_hold(lesson.now), "there is nothing to hold");
+    lesson.class.arm_news(lesson.now, ArmNews { answers: false, ..ANSWERS });
+    assert!(lesson.class.take_hold(lesson.now), "perhaps only its replies are lost");
+    lesson.pass(1_000);
     assert_eq!(lesson.shown().stop.map(|stop| (stop.asked, stop.confirmed)), Some((2, 1)));
     lesson.class.arm_news(lesson.now, ANSWERS);
     lesson.hold();
@@ -490,7 +509,7 @@ proptest! {
                 }),
                 Deed::Order(order) => lesson.order(&order),
                 Deed::Arm(answers, is_holding, holds) => {
-                    lesson.class.arm_news(lesson.now, ArmNews { answers, is_holding, holds, is_limp: false });
+                    lesson.class.arm_news(lesson.now, ArmNews { answers, may_hear: answers, is_holding, holds, is_limp: false });
                 }
                 Deed::Pass(millis) => lesson.pass(millis),
                 Deed::Hear(tab) => tabs[usize::from(tab)].into_iter().for_each(|id| drop(lesson.hear_all(id))),

@@ -5,6 +5,7 @@
 mod rig;
 
 use protocol_core::registers::map::{PRESENT_POSITION, TARGET_POSITION};
+use protocol_core::time::Duration;
 use rig::{SHARING, World, read, sharing, write};
 
 const POSE: [u8; 7] = [90, 90, 65, 90, 90, 90, 80];
@@ -65,4 +66,64 @@ fn without_an_arm_a_page_is_told() {
         answers.iter().all(|(_, answer)| answer.contains("does not answer")) && answers.len() == 3,
         "{answers:?}"
     );
+}
+
+/// The arm is switched off behind an adapter that stays: the port stays open.
+#[test]
+fn an_arm_without_power_is_told_while_a_program_reads_or_somebody_watches() {
+    for watches in [false, true] {
+        let mut world = World::new(2);
+        world.join_page();
+        if watches {
+            world.hub.watch_arm();
+        }
+        (world.loses_replies, world.loses_requests) = (true, true);
+        if !watches {
+            world.run(10_000);
+            assert!(world.hub.has_arm(), "nobody asked");
+            world.send(0, &read(PRESENT_POSITION.address, 7));
+        }
+        world.run(2_900);
+        assert!(world.hub.has_arm());
+        world.run(1_300);
+        assert!(!world.hub.has_arm());
+        assert_eq!(sharing(&mut world, 1)[4], 8);
+        assert!(world.page_round_trip(0, r#"{"cmd":"read","id":54,"num":7}"#) < Duration::from_millis(5));
+        world.send(0, &write(TARGET_POSITION.address, &[150]));
+        world.power_cycle();
+        (world.loses_replies, world.loses_requests) = (false, false);
+        world.run(600);
+        assert!(world.hub.has_arm());
+        assert_eq!(world.arm.registers().read(TARGET_POSITION.address, 7), POSE, "nothing is kept");
+        world.round_trip(0, &read(PRESENT_POSITION.address, 7));
+    }
+}
+
+/// Replies are lost for 2.5 seconds each time, and one comes between.
+#[test]
+fn an_arm_that_answers_seldom_is_an_arm() {
+    let mut world = World::new(1);
+    world.hub.watch_arm();
+    for _ in 0..10 {
+        world.loses_replies = true;
+        world.run(2_500);
+        world.loses_replies = false;
+        world.run(1_100);
+        assert!(world.hub.has_arm());
+    }
+}
+
+/// A watched arm is asked once a second, and not more.
+#[test]
+fn nobody_disturbs_an_arm_that_nobody_uses() {
+    for (watches, questions) in [(false, 0), (true, 10)] {
+        let mut world = World::new(1);
+        if watches {
+            world.hub.watch_arm();
+        }
+        world.run(1_500);
+        world.sent.clear();
+        world.run(10_000);
+        assert_eq!(world.sent.len(), 7 * questions);
+    }
 }

@@ -3,12 +3,12 @@
 use host_link::sharing::Command;
 use protocol_core::time::Instant;
 
+use super::Hub;
 use super::client::{LONGEST_WAIT, MOST_WAITING, Waiting};
 use super::client_id::ClientId;
 use super::drive::MayNotMove;
 use super::intent::Intent;
 use super::request::WholeRequest;
-use super::{ArmState, Hub};
 
 /// What becomes of a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,11 +42,10 @@ impl Hub {
         let Some(client) = self.clients.get_mut(&id).filter(|client| client.has_room()) else {
             return Admission::NoRoom;
         };
-        if self.arm != ArmState::Present {
-            self.answer_without_arm(now, id, &request);
-            return Admission::NoArm;
-        }
         let (intent, command) = client.meaning(now, &request, &self.known);
+        if !self.has_arm() {
+            return self.request_without_arm(now, id, request, intent, command);
+        }
         if self.options.is_read_only {
             self.queue(now, id, Waiting { request, intent: Intent::Setting, since });
             return if intent.is_some() { Admission::ReadOnly } else { Admission::Queued };
@@ -70,7 +69,7 @@ impl Hub {
 
     /// Stops the arm for a client, as 1 in register 239 does. [`Hub::hold_outcome`] tells what came of it.
     pub fn stop_arm(&mut self, now: Instant, id: ClientId) -> Admission {
-        if !self.has_arm() {
+        if !self.has_arm() && !self.is_silent() {
             return Admission::NoArm;
         }
         if self.options.is_read_only {
@@ -78,6 +77,37 @@ impl Hub {
         }
         self.obey(now, id, Command::Stop);
         Admission::Queued
+    }
+
+    /// Would a stop end this request of a client, if it waited?
+    #[must_use]
+    pub fn moves_arm(&self, now: Instant, id: ClientId, request: &WholeRequest) -> bool {
+        let meaning = self.clients.get(&id).map(|client| client.meaning(now, request, &self.known));
+        meaning.and_then(|(intent, _)| intent).is_some_and(Intent::is_ended_by_stop)
+    }
+
+    /// No arm answers. If perhaps only the replies of a silent one are lost, it is stopped, or its motors are switched off.
+    fn request_without_arm(
+        &mut self,
+        now: Instant,
+        id: ClientId,
+        request: WholeRequest,
+        intent: Option<Intent>,
+        command: Option<Command>,
+    ) -> Admission {
+        let may_hear = self.is_silent() && !self.options.is_read_only;
+        match intent.filter(|_| may_hear) {
+            Some(intent @ Intent::MotorsOff) => {
+                self.stop(now, id);
+                self.queue(now, id, Waiting { request, intent, since: now });
+                return Admission::Queued;
+            }
+            Some(Intent::Stop | Intent::Hold) => self.obey(now, id, Command::Stop),
+            Some(_) if command == Some(Command::Stop) => self.obey(now, id, Command::Stop),
+            _ => {}
+        }
+        self.answer_without_arm(now, id, &request);
+        Admission::NoArm
     }
 
     /// Answers a request while there is no arm: a read of the server's own registers gets a reply, all others are refused.

@@ -1,18 +1,21 @@
 //! From the line to the clients: each reply to the client that asked, with the registers that are not the arm's.
 
 use host_link::sharing::{self, DrivenBy, SharingState};
-use protocol_core::registers::map::{FAULTS, fault, motor_state};
+use protocol_core::registers::map::{FAULTS, fault};
 use protocol_core::time::Instant;
 
+use super::Hub;
 use super::client::{Client, Event};
 use super::client_id::ClientId;
 use super::line::Owner;
 use super::own_registers::byte_at;
 use super::request::WholeRequest;
-use super::{HoldOutcome, Hub};
 
 impl Hub {
     pub(super) fn deliver(&mut self, now: Instant, owner: Owner, event: Event) {
+        if matches!(event, Event::Reply { .. }) {
+            self.presence.hear(now);
+        }
         match (owner, event) {
             (Owner::Client(id), mut event) => {
                 if let Event::Reply { address, values } = &mut event {
@@ -29,20 +32,14 @@ impl Hub {
                     }
                 }
             }
-            (Owner::Hold, Event::Reply { address, values }) => {
-                self.continue_hold(now, Some((address, &values)));
-            }
-            (Owner::Hold, _) => self.continue_hold(now, None),
-            // A hold that began meanwhile has an outcome of its own.
-            (Owner::MotorState, event) if self.hold.is_none() => self.end_hold(match event {
-                Event::Reply { values, .. } if values.first() == Some(&motor_state::SERVO) => {
-                    HoldOutcome::Holds
-                }
-                Event::Reply { .. } => HoldOutcome::Limp,
-                _ => HoldOutcome::Unconfirmed,
-            }),
+            (Owner::Hold, Event::Reply { address, values }) => self.continue_hold(now, address, &values),
+            (Owner::Speeds, Event::Reply { values, .. }) => self.note_speeds(&values),
             (Owner::Identity, Event::Reply { values, .. }) => self.identify(now, &values),
-            (Owner::Sample(_) | Owner::Identity | Owner::MotorState, _) => {}
+            (Owner::Presence, Event::NoReply { .. }) if self.has_arm() && self.presence.miss() => {
+                self.lose_arm(now);
+            }
+            // A hold reads again by itself.
+            (Owner::Sample(_) | Owner::Identity | Owner::Presence | Owner::Hold | Owner::Speeds, _) => {}
         }
     }
 
@@ -52,6 +49,7 @@ impl Hub {
             *faults |= if self.watchdog.has_acted() { fault::HOST_SILENT } else { 0 };
         }
         self.watchdog.overlay(address, values);
+        self.overlay_speeds(address, values);
         if let Some(client) = self.clients.get(&id) {
             client.own.overlay(address, values);
             self.sharing_state(now, id, client).overlay(address, values);

@@ -1,12 +1,12 @@
-//! The arm's registers as the hub knows them without a read: the EEPROM lock and register 20. They decide which writes
-//! the arm refuses, and how it shows offsets before a write.
+//! The arm's registers as the hub knows them without a read: the EEPROM lock and register 20, which decide which writes
+//! the arm refuses, and how it shows offsets before a write; and the speeds, which a hold restores.
 //!
-//! Both are read when the arm is found. After that only the hub writes to the arm. Full settings storage is
+//! They are read when the arm is found. After that only the hub writes to the arm. Full settings storage is
 //! unknown here, and so is a restart of the controller, which locks the EEPROM.
 
 use motion_core::reach;
 use protocol_core::registers::map::{
-    CHIP_ID, DEVICE_CODE, EEPROM_LOCK, FINE_TARGET, FIRMWARE_VERSION, TARGET_POSITION, WATCHDOG_ACTION,
+    CHIP_ID, DEVICE_CODE, EEPROM_LOCK, FINE_TARGET, FIRMWARE_VERSION, SPEED, TARGET_POSITION, WATCHDOG_ACTION,
 };
 use protocol_core::registers::map21::{OPTIONS, option};
 use protocol_core::registers::{Accepted, Joint, Map, RegisterFile};
@@ -18,8 +18,8 @@ use super::angles::Angles;
 pub(crate) struct KnownRegisters(RegisterFile);
 
 impl KnownRegisters {
-    /// The read that finds an arm, from the device code to the lock: the first register, and how many.
-    pub(crate) const IDENTITY: (u8, u8) = (DEVICE_CODE.address, EEPROM_LOCK.address + 1);
+    /// The read that finds an arm, from the device code to the speeds: the first register, and how many.
+    pub(crate) const IDENTITY: (u8, u8) = (DEVICE_CODE.address, SPEED.address + SPEED.count);
 
     /// The registers of an arm that has just started.
     pub(crate) fn new() -> Self {
@@ -30,7 +30,7 @@ impl KnownRegisters {
     pub(crate) fn of_arm(values: &[u8]) -> Option<Self> {
         let mut known = Self::new();
         for (address, &value) in (Self::IDENTITY.0..).zip(values) {
-            let known_rows = [DEVICE_CODE, FIRMWARE_VERSION, CHIP_ID, EEPROM_LOCK, OPTIONS];
+            let known_rows = [DEVICE_CODE, FIRMWARE_VERSION, CHIP_ID, EEPROM_LOCK, OPTIONS, SPEED];
             if known_rows.iter().any(|register| register.holds(address)) {
                 known.0.set(address, value);
             }
@@ -52,6 +52,21 @@ impl KnownRegisters {
     /// Does the watchdog switch the motors off (register 187)?
     pub(crate) fn watchdog_damps(&self) -> bool {
         self.0.get(WATCHDOG_ACTION.address) != 0
+    }
+
+    /// The speeds of all joints. A brake of the hub is not among them.
+    pub(crate) fn speeds(&self) -> &[u8] {
+        self.0.read(SPEED.address, SPEED.count)
+    }
+
+    /// These are the speeds that a hold restores.
+    pub(crate) fn set_speeds(&mut self, speeds: &[u8]) {
+        (SPEED.address..).zip(speeds).for_each(|(address, &speed)| self.0.set(address, speed));
+    }
+
+    /// A register of one byte.
+    pub(crate) fn byte(&self, address: u8) -> u8 {
+        self.0.get(address)
     }
 
     /// A register of two bytes.

@@ -19,12 +19,16 @@ use super::stream::Stream;
 /// a lost frame costs its client, and those that wait for the line, no more than that. The end is late, because a computer that
 /// is busy may not run the arm's side of the port for a second.
 const CLIENT_PATIENCE: Patience = Patience { attempts: 3, timeout: Duration::from_millis(1_000) };
+/// For the reads of a hold: it sends another one every 100 ms, behind the brake. Each of them may be answered for a second.
+const HOLD_PATIENCE: Patience = Patience { attempts: 10, timeout: Duration::from_millis(100) };
 /// What the hub asks for itself, and asks again in time.
 const OWN_PATIENCE: Patience = Patience { attempts: 1, timeout: Duration::from_millis(1_000) };
 /// The line may be filled this far ahead, so that it is not idle while the program wakes up.
 const AHEAD: Duration = Duration::from_millis(1);
 /// Bytes that may wait for the port.
 const MOST_OUTPUT: usize = 64;
+/// With so many bytes the port does not take what is written: a hold that is repeated all the time adds nothing.
+const STUCK_OUTPUT: usize = 1_024;
 /// Bytes of replies that may be on their way. One read is always allowed.
 const WINDOW: usize = 96;
 
@@ -41,17 +45,20 @@ pub(crate) enum Owner {
     Sample(Stream),
     /// The hub, to hold the arm.
     Hold,
-    /// The hub, to find out whether the motors of an arm that it has held are on.
-    MotorState,
+    /// The hub, to know the speeds before it slows the joints down.
+    Speeds,
     /// The hub, to find out whether a 7Bot V2 is there.
     Identity,
+    /// The hub, to find out whether the arm still answers.
+    Presence,
 }
 
 impl Owner {
     const fn patience(self) -> Patience {
         match self {
-            Self::Client(_) | Self::Hold | Self::MotorState => CLIENT_PATIENCE,
-            Self::Sample(_) | Self::Identity => OWN_PATIENCE,
+            Self::Client(_) => CLIENT_PATIENCE,
+            Self::Hold => HOLD_PATIENCE,
+            Self::Sample(_) | Self::Speeds | Self::Identity | Self::Presence => OWN_PATIENCE,
         }
     }
 }
@@ -79,6 +86,29 @@ impl Line {
     pub(crate) fn reset(&mut self) {
         self.link.reset();
         self.output.clear();
+    }
+
+    /// All reads end without a reply. The bytes that wait for the port are kept: they are a stop, or a part of a frame.
+    pub(crate) fn end_reads(&mut self) {
+        self.link.reset();
+    }
+
+    /// Gives up the reads of this owner: what they show is out of date.
+    pub(crate) fn cancel_reads(&mut self, owner: Owner) {
+        let link = &mut self.link;
+        self.owners.retain(|&id, owners| {
+            let is_kept = !owners.contains(&owner);
+            if !is_kept {
+                link.cancel(id);
+            }
+            is_kept
+        });
+        self.events.retain(|(other, _)| *other != owner);
+    }
+
+    /// Has a read no reply yet?
+    pub(crate) fn is_waiting(&self) -> bool {
+        !self.owners.is_empty()
     }
 
     /// Takes bytes of the arm.
@@ -124,6 +154,11 @@ impl Line {
         } else {
             Instant::from_micros(self.link.busy_until().as_micros() - AHEAD.as_micros())
         }
+    }
+
+    /// Does the port take no bytes?
+    pub(crate) const fn is_stuck(&self) -> bool {
+        self.output.len() >= STUCK_OUTPUT
     }
 
     /// May reads be sent whose replies have `bytes` bytes?

@@ -17,15 +17,18 @@
 mod admission;
 mod angles;
 mod arm_hold;
+mod arm_state;
 mod client;
 mod client_id;
 mod delivery;
 mod drive;
 mod held_targets;
+mod holding;
 mod intent;
 mod known_registers;
 mod line;
 mod own_registers;
+mod presence;
 mod readings;
 mod request;
 mod sampler;
@@ -37,17 +40,16 @@ mod watchdog;
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use protocol_core::registers::Map;
-use protocol_core::registers::map::{FEEDBACK_FREQUENCY, SET_POINT_PERIOD};
-use protocol_core::registers::map21::{ANGLE_FEEDBACK_FREQUENCY, LOAD_FEEDBACK_FREQUENCY};
-use protocol_core::time::{Duration, Instant};
+use protocol_core::time::Instant;
 
 use self::arm_hold::ArmHold;
+use self::arm_state::ArmState;
 use self::client::Client;
 use self::drive::Driver;
 use self::held_targets::HeldTargets;
 use self::known_registers::KnownRegisters;
-use self::line::{Line, Owner};
+use self::line::Line;
+use self::presence::Presence;
 use self::sampler::Sampler;
 use self::shares::Shares;
 use self::watchdog::ClientWatchdog;
@@ -55,22 +57,9 @@ use self::watchdog::ClientWatchdog;
 pub use self::admission::Admission;
 pub use self::client::{Event, LONGEST_WAIT, MOST_WAITING};
 pub use self::client_id::ClientId;
+pub use self::holding::HoldOutcome;
 pub use self::request::WholeRequest;
 pub use self::stream::Stream;
-
-/// Time between two questions to a port behind which no arm has answered yet.
-const IDENTIFY_PERIOD: Duration = Duration::from_millis(250);
-
-/// How an arm is after a hold of the hub.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum HoldOutcome {
-    /// Its joints hold where they are.
-    Holds,
-    /// Its motors are off.
-    Limp,
-    /// It has not confirmed the hold: it may be moving.
-    Unconfirmed,
-}
 
 /// What clients may do.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -79,17 +68,6 @@ pub struct HubOptions {
     pub is_read_only: bool,
     /// Only one client moves the arm at a time.
     pub has_one_driver: bool,
-}
-
-/// Does an arm answer?
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum ArmState {
-    /// The port is closed.
-    Absent,
-    /// The port is open. The next question is due at this time.
-    Identifying(Instant),
-    /// A 7Bot V2 answered.
-    Present,
 }
 
 /// The clients of one arm, and the line to it.
@@ -102,12 +80,15 @@ pub struct Hub {
     /// The chip id that the arm has to have.
     chip_id: Option<Vec<u8>>,
     line: Line,
+    presence: Presence,
     sampler: Sampler,
     watchdog: ClientWatchdog,
     /// The hub holds the arm by itself.
     hold: Option<ArmHold>,
     /// What came of the last hold.
     hold_outcome: Option<HoldOutcome>,
+    /// A hold slowed the joints down, and has not restored their speeds.
+    is_slowed: bool,
     held: HeldTargets,
     driver: Driver,
     /// Stops of all clients so far, wrapping.
@@ -129,10 +110,12 @@ impl Hub {
             known: KnownRegisters::new(),
             chip_id: None,
             line: Line::new(baud, options.is_read_only),
+            presence: Presence::default(),
             sampler: Sampler::new(baud),
             watchdog: ClientWatchdog::default(),
             hold: None,
             hold_outcome: None,
+            is_slowed: false,
             held: HeldTargets::default(),
             driver: Driver::new(options.has_one_driver),
             stops: 0,
@@ -174,28 +157,6 @@ impl Hub {
         self.clients.get(&id).is_some_and(Client::has_room)
     }
 
-    /// Holds the arm; after the hold in progress, if there is one.
-    fn start_hold(&mut self) {
-        self.hold_outcome = None;
-        if let Some(hold) = &mut self.hold {
-            return hold.want_again();
-        }
-        let is_streaming = self.known.word(SET_POINT_PERIOD.address) != 0;
-        self.hold = Some(ArmHold::new(self.known.is_ours(), is_streaming));
-    }
-
-    /// Is the hub about to hold the arm by itself?
-    #[must_use]
-    pub const fn is_holding(&self) -> bool {
-        self.hold.is_some()
-    }
-
-    /// What came of the last hold of the hub; `None`: nothing yet.
-    #[must_use]
-    pub const fn hold_outcome(&self) -> Option<HoldOutcome> {
-        self.hold_outcome
-    }
-
     /// The clients that have something new since the last call: events, or room for requests.
     pub fn take_news(&mut self) -> BTreeSet<ClientId> {
         std::mem::take(&mut self.news)
@@ -232,32 +193,20 @@ impl Hub {
         self.deliver_all(Instant::ZERO);
     }
 
-    fn end_hold(&mut self, outcome: HoldOutcome) {
-        self.hold_outcome = Some(outcome);
-        self.news.extend(self.clients.keys());
-    }
-
     /// Nothing of what was sent or waits may reach the arm that comes next.
     fn forget_arm(&mut self) {
         self.line.reset();
         (self.hold, self.hold_outcome) = (None, None);
+        self.drop_requests();
+    }
+
+    fn drop_requests(&mut self) {
         self.held = HeldTargets::default();
         self.driver.end(None);
         for (&id, client) in &mut self.clients {
             client.drop_waiting();
             self.news.insert(id);
         }
-    }
-
-    /// Does a 7Bot V2 answer?
-    #[must_use]
-    pub fn has_arm(&self) -> bool {
-        self.arm == ArmState::Present
-    }
-
-    /// From now on only this arm counts, by its chip id.
-    pub fn expect_same_arm(&mut self) {
-        self.chip_id = Some(self.known.chip_id().to_vec());
     }
 
     /// Takes bytes of the arm. An empty slice states that its line is silent at `now`.
@@ -270,22 +219,15 @@ impl Hub {
     pub fn poll(&mut self, now: Instant) {
         self.deliver_all(now);
         self.clients.retain(|_, client| !client.has_left(now));
-        match self.arm {
-            ArmState::Absent => {}
-            ArmState::Identifying(due) => {
-                if due <= now && self.line.is_free(now) {
-                    let (address, count) = KnownRegisters::IDENTITY;
-                    self.line.send_read(now, Owner::Identity, address, count);
-                    self.arm = ArmState::Identifying(now + IDENTIFY_PERIOD);
-                }
+        if self.arm == ArmState::Present || self.is_silent() {
+            if let Some(action) = self.watchdog.poll(now).filter(|_| !self.options.is_read_only) {
+                self.act(now, action);
             }
-            ArmState::Present => {
-                if let Some(action) = self.watchdog.poll(now).filter(|_| !self.options.is_read_only) {
-                    self.act(now, action);
-                }
-                self.send_urgent(now);
-                while self.line.is_free(now) && self.send_next(now) {}
-            }
+            self.send_urgent(now);
+        }
+        self.ask_arm(now);
+        if self.has_arm() {
+            while self.line.is_free(now) && self.send_next(now) {}
         }
     }
 
@@ -303,33 +245,20 @@ impl Hub {
     /// When to call [`Hub::poll`] and [`Hub::arm_bytes`] again, without other events.
     #[must_use]
     pub fn deadline(&self, now: Instant) -> Instant {
+        let hold = self.hold.as_ref().map_or(Instant::FAR_FUTURE, ArmHold::due);
+        let urgent = hold.min(self.watchdog.due());
         let line = self.line.deadline();
-        let watchdog = self.watchdog.due();
+        let question = self.question_due().max(self.line.free_at(now));
         match self.arm {
             ArmState::Absent => Instant::FAR_FUTURE,
-            ArmState::Identifying(due) => line.min(due),
+            ArmState::Identifying(_) => line.min(question),
+            ArmState::Silent(_) => line.min(question).min(urgent),
             ArmState::Present if self.clients.values().any(|client| self.line.takes(client)) => {
-                line.min(self.line.free_at(now)).min(watchdog)
+                line.min(self.line.free_at(now)).min(urgent)
             }
-            ArmState::Present => line.min(watchdog).min(self.sampler.due().max(self.line.free_at(now))),
-        }
-    }
-
-    /// An unknown device answered, or a 7Bot V2. A stream that an earlier program left running ends.
-    fn identify(&mut self, now: Instant, values: &[u8]) {
-        let Some(known) = KnownRegisters::of_arm(values) else { return };
-        let is_wanted = self.chip_id.as_deref().is_none_or(|id| known.chip_id() == id);
-        if is_wanted && self.arm != ArmState::Present {
-            self.arm = ArmState::Present;
-            self.known = known;
-            self.watchdog.forget();
-            if self.options.is_read_only {
-                return;
+            ArmState::Present => {
+                line.min(question).min(urgent).min(self.sampler.due().max(self.line.free_at(now)))
             }
-            for register in [ANGLE_FEEDBACK_FREQUENCY, LOAD_FEEDBACK_FREQUENCY] {
-                self.line.send_write(now, Map::V21, register.address, &[0]);
-            }
-            self.line.send_write(now, Map::V22, FEEDBACK_FREQUENCY.address, &[0]);
         }
     }
 

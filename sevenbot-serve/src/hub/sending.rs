@@ -1,10 +1,10 @@
 //! From the queues to the line: stops first, then what the hub does by itself, then the client whose turn it is.
 
 use protocol_core::registers::Map;
-use protocol_core::registers::map::{MOTOR_STATE, OFFSET, SET_POINT_PERIOD, motor_state};
+use protocol_core::registers::map::{OFFSET, SPEED};
 use protocol_core::time::Instant;
 
-use super::arm_hold::ArmHold;
+use super::Hub;
 use super::client::Waiting;
 use super::client_id::ClientId;
 use super::intent::Intent;
@@ -13,21 +13,9 @@ use super::own_registers::covers;
 use super::request::{WholeRequest, read_bytes, without_idle_ends};
 use super::shares::Shares;
 use super::stream::Stream;
-use super::watchdog::{ClientWatchdog, WatchdogAction};
-use super::{HoldOutcome, Hub};
+use super::watchdog::ClientWatchdog;
 
 impl Hub {
-    /// The watchdog of a client acts.
-    pub(super) fn act(&mut self, now: Instant, action: WatchdogAction) {
-        match action {
-            WatchdogAction::Hold => self.start_hold(),
-            WatchdogAction::Damp => {
-                self.note_targets(Intent::MotorsOff, Map::V22, MOTOR_STATE.address, &[]);
-                self.write_arm(now, MOTOR_STATE.address, &[motor_state::DAMPING]);
-            }
-        }
-    }
-
     /// Sends stops, and what the hub needs to hold the arm. They wait for no other frame.
     pub(super) fn send_urgent(&mut self, now: Instant) {
         let ids: Vec<ClientId> = self.clients.keys().copied().collect();
@@ -36,47 +24,7 @@ impl Hub {
                 self.send_request(now, id, waiting);
             }
         }
-        if let Some((address, count)) = self.hold.as_mut().and_then(ArmHold::next_read) {
-            self.line.send_read(now, Owner::Hold, address, count);
-        }
-    }
-
-    /// Writes registers by itself. A set-point period would delay targets.
-    fn write_arm(&mut self, now: Instant, address: u8, values: &[u8]) {
-        self.known.write(Map::V22, address, values);
-        self.line.send_write(now, Map::V22, address, values);
-    }
-
-    /// Writes the targets that hold the arm.
-    pub(super) fn continue_hold(&mut self, now: Instant, reply: Option<(u8, &[u8])>) {
-        let Some(mut hold) = self.hold.take() else { return };
-        let frames = match reply {
-            Some((address, values)) => hold.frames(address, values, &self.held),
-            None => {
-                hold.note_no_reply();
-                Vec::new()
-            }
-        };
-        let period = self.known.word(SET_POINT_PERIOD.address);
-        if !frames.is_empty() && period != 0 {
-            self.write_arm(now, SET_POINT_PERIOD.address, &[0, 0]);
-        }
-        for (address, values) in &frames {
-            self.note_targets(Intent::Hold, Map::V22, *address, values);
-            self.write_arm(now, *address, values);
-        }
-        if !frames.is_empty() && period != 0 {
-            self.write_arm(now, SET_POINT_PERIOD.address, &period.to_le_bytes());
-        }
-        match hold.is_over() {
-            false => self.hold = Some(hold),
-            true if hold.is_wanted_again() => self.start_hold(),
-            true if let Some(next) = hold.for_unmeasured() => self.hold = Some(next),
-            true if hold.is_confirmed() => {
-                self.line.send_read(now, Owner::MotorState, MOTOR_STATE.address, MOTOR_STATE.count);
-            }
-            true => self.end_hold(HoldOutcome::Unconfirmed),
-        }
+        self.send_hold(now);
     }
 
     /// Sends the next request or sample. Returns false if there is none.
@@ -191,6 +139,9 @@ impl Hub {
         }
         if !self.options.is_read_only {
             self.note_targets(intent, map, address, &values);
+            if covers(&SPEED, address, values.len()) {
+                self.line.cancel_reads(Owner::Speeds);
+            }
             self.known.write(map, address, &values);
             if is_accepted && map == Map::V22 {
                 let damps = self.known.watchdog_damps();
@@ -203,7 +154,7 @@ impl Hub {
     }
 
     /// A write goes to the arm: which joints does it hold, or move?
-    fn note_targets(&mut self, intent: Intent, map: Map, address: u8, values: &[u8]) {
+    pub(super) fn note_targets(&mut self, intent: Intent, map: Map, address: u8, values: &[u8]) {
         let targets = self.known.targets_in(map, address, values);
         self.held.note_write(intent, &targets);
         if let Some(hold) = self.hold.as_mut().filter(|_| intent.holds()) {

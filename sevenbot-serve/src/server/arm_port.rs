@@ -35,7 +35,7 @@ pub(super) struct ArmPort {
 enum ArmPortState {
     /// Tried again at this time.
     Closed(Instant),
-    /// Opened at this time.
+    /// Opened at this time, or the arm was there then.
     Open(ArmSerial, Instant),
 }
 
@@ -55,7 +55,7 @@ impl ArmPort {
                 self.receive(hub, now, &mut notify);
                 hub.poll(now);
                 self.send(hub, now, &mut notify);
-                (hub.deadline(now).min(self.deadline()), !hub.to_arm().is_empty())
+                (hub.deadline(now).min(self.deadline(hub)), !hub.to_arm().is_empty())
             });
             tokio::select! {
                 () = self.is_ready(has_output) => {}
@@ -77,12 +77,18 @@ impl ArmPort {
 
     /// Opens the port if it is time to, and passes bytes of the arm to the hub.
     fn receive(&mut self, hub: &mut Hub, now: Instant, notify: &mut dyn FnMut(Notice)) {
-        match &self.state {
+        let timeout = self.identify_timeout();
+        match &mut self.state {
             ArmPortState::Closed(due) if *due <= now => self.open(hub, now, notify),
             ArmPortState::Closed(_) => {}
-            ArmPortState::Open(port, opened) => {
+            ArmPortState::Open(port, since) => {
                 let had_arm = hub.has_arm();
-                match read_all(port, hub, now) {
+                let outcome = read_all(port, hub, now);
+                if hub.has_arm() {
+                    *since = now;
+                }
+                let is_late = *since + timeout <= now;
+                match outcome {
                     Err(error) => self.close(hub, now, notify, &error.to_string()),
                     Ok(()) if hub.has_arm() && !had_arm => {
                         if let Some(search) = &mut self.search {
@@ -91,7 +97,10 @@ impl ArmPort {
                         }
                         self.notify(Notice::ArmFound(self.path.clone()), notify);
                     }
-                    Ok(()) if !hub.has_arm() && *opened + self.identify_timeout() <= now => {
+                    Ok(()) if self.stays_open(hub) => {
+                        self.notify(Notice::ArmSilent(self.path.clone()), notify);
+                    }
+                    Ok(()) if !hub.has_arm() && is_late => {
                         self.notify(Notice::ArmSilent(self.path.clone()), notify);
                         hub.close_arm();
                         self.state = ArmPortState::Closed(now + RETRY_PERIOD);
@@ -100,6 +109,12 @@ impl ArmPort {
                 }
             }
         }
+    }
+
+    /// Does the port of a silent arm stay open? A stop may still reach the arm, and an unplugged adapter is an error. Where the arm
+    /// may come back under another name, that is tried, too.
+    const fn stays_open(&self, hub: &Hub) -> bool {
+        hub.is_silent() && self.search.is_none()
     }
 
     /// Sends the hub's bytes.
@@ -115,14 +130,12 @@ impl ArmPort {
     }
 
     /// When to call [`ArmPort::receive`] without other events.
-    fn deadline(&self) -> Instant {
+    fn deadline(&self, hub: &Hub) -> Instant {
         match &self.state {
             ArmPortState::Closed(due) => *due,
             // Only while it is not known what is behind the port does the time matter, but then it is short.
-            ArmPortState::Open(.., opened)
-                if self.last_notice != Some(Notice::ArmFound(self.path.clone())) =>
-            {
-                *opened + self.identify_timeout()
+            ArmPortState::Open(.., since) if !hub.has_arm() && !self.stays_open(hub) => {
+                *since + self.identify_timeout()
             }
             ArmPortState::Open(..) => Instant::FAR_FUTURE,
         }

@@ -31,7 +31,10 @@ pub(super) struct Class {
 
 impl Class {
     pub(super) fn new(shared: Arc<Shared>, room: Classroom) -> Arc<Self> {
-        let client = shared.with_hub(|hub, _| hub.connect());
+        let client = shared.with_hub(|hub, _| {
+            hub.watch_arm();
+            hub.connect()
+        });
         let (room, wakes) = (Mutex::new(room), Mutex::default());
         Arc::new(Self { shared, room, wakes, client, session: watch::Sender::new(None) })
     }
@@ -71,6 +74,7 @@ impl Class {
         }
         let news = self.shared.with_hub(|hub, _| ArmNews {
             answers: hub.has_arm(),
+            may_hear: hub.has_arm() || hub.is_silent(),
             is_holding: hub.is_holding(),
             holds: matches!(hub.hold_outcome(), Some(HoldOutcome::Holds | HoldOutcome::Limp)),
             is_limp: hub.hold_outcome() == Some(HoldOutcome::Limp),

@@ -48,6 +48,10 @@ pub struct World {
     pub sent: Vec<u8>,
     /// The next byte of the arm is damaged on the line.
     pub damages_next_byte: bool,
+    /// The arm's bytes are lost on the line.
+    pub loses_replies: bool,
+    /// Bytes to the arm are lost on the line.
+    pub loses_requests: bool,
     pub programs: Vec<Program>,
     pub pages: Vec<Page>,
 }
@@ -95,6 +99,8 @@ impl World {
             is_plugged: false,
             sent: Vec::new(),
             damages_next_byte: false,
+            loses_replies: false,
+            loses_requests: false,
             programs: Vec::new(),
             pages: Vec::new(),
         };
@@ -191,7 +197,10 @@ impl World {
         self.hub.poll(self.now);
         if self.is_plugged {
             let room = self.arm.host_room().min(self.hub.to_arm().len());
-            let sent = self.arm.host_send(self.now, &self.hub.to_arm()[..room]);
+            let sent = match self.loses_requests {
+                true => room,
+                false => self.arm.host_send(self.now, &self.hub.to_arm()[..room]),
+            };
             self.sent.extend(&self.hub.to_arm()[..sent]);
             self.hub.sent_to_arm(sent);
             self.arm.advance(self.now, true);
@@ -200,6 +209,9 @@ impl World {
             if let Some(byte) = received.first_mut().filter(|_| self.damages_next_byte) {
                 *byte ^= 0xFF;
                 self.damages_next_byte = false;
+            }
+            if self.loses_replies {
+                received.clear();
             }
             self.hub.arm_bytes(self.now, &received);
         }

@@ -4,6 +4,7 @@
 //! ```text
 //!   read which joints are silent or move ──▶ none: the arm holds
 //!     └─▶ read targets and positions ──▶ write the positions of these joints as targets ──▶ read again, until no target differs
+//!           └─▶ read the motor state and the speeds, until these are restored (`holding`)
 //! ```
 //!
 //! A joint that has reached its target keeps it ([D24](protocol_core::decisions#d24)). Its load draws it some tenths of a degree
@@ -12,15 +13,19 @@
 
 use host_link::keep_limits;
 use protocol_core::registers::map::{
-    FINE_POSITION, FINE_TARGET, LIMITS, MISSING_SERVOS, MOVING_JOINTS, PRESENT_POSITION, TARGET_POSITION,
+    FINE_POSITION, FINE_TARGET, LIMITS, MISSING_SERVOS, MOTOR_STATE, MOVING_JOINTS, PRESENT_POSITION, SPEED,
+    TARGET_POSITION,
 };
 use protocol_core::registers::{JOINTS, Joint, Register};
+use protocol_core::time::{Duration, Instant};
 
 use super::angles::{Angles, DEGREE, UNMEASURED, angles_in, limits_in};
 use super::held_targets::HeldTargets;
 
-/// Reads and writes are repeated this often.
-const MOST_ROUNDS: u8 = 5;
+/// After so many replies that do not confirm the hold it has failed.
+const MOST_ROUNDS: u8 = 10;
+/// A read without a reply is repeated after this time, behind another brake.
+const REPEAT_PERIOD: Duration = Duration::from_millis(100);
 /// A hold is repeated this often until each joint whose set-point moves was measured: for 0.2 s or more. It takes
 /// 0.2 s after power-up.
 const MOST_REPEATS: u8 = 40;
@@ -42,14 +47,19 @@ pub(crate) struct ArmHold {
     /// A joint whose set-point moves was not measured yet: it goes on once it is.
     has_unmeasured: bool,
     repeats: u8,
+    /// Replies so far.
     rounds: u8,
     sent: Vec<Frame>,
-    /// Joints that a client held after the last read was sent, one bit each.
+    /// Joints that a client held after the first read without a reply was sent, one bit each.
     held_meanwhile: u8,
-    /// Its read has no reply yet.
-    waits: bool,
+    /// When the read is repeated that has no reply yet; `None`: the next one is due.
+    repeat_at: Option<Instant>,
+    /// All joints have to be slowed down before the next read.
+    is_brake_due: bool,
     /// The arm holds.
     is_done: bool,
+    /// It holds, and the speeds are being restored.
+    is_finishing: bool,
     /// Another hold was wanted meanwhile: what this one has read may be older than that.
     is_wanted_again: bool,
 }
@@ -69,8 +79,10 @@ impl ArmHold {
             rounds: 0,
             sent: Vec::new(),
             held_meanwhile: 0,
-            waits: false,
+            repeat_at: None,
+            is_brake_due: true,
             is_done: false,
+            is_finishing: false,
             is_wanted_again: false,
         }
     }
@@ -88,7 +100,7 @@ impl ArmHold {
     /// The hold that follows this one because a joint whose set-point moves was not measured yet.
     pub(crate) fn for_unmeasured(&self) -> Option<Self> {
         let repeats = self.repeats.checked_sub(1).filter(|_| self.has_unmeasured)?;
-        Some(Self { repeats, ..Self::new(self.is_fine, self.is_streaming) })
+        Some(Self { repeats, is_brake_due: false, ..Self::new(self.is_fine, self.is_streaming) })
     }
 
     /// A client holds the joints that have a target here: what was read of them before is out of date.
@@ -98,19 +110,49 @@ impl ArmHold {
     }
 
     /// The registers to read now, and how many.
-    pub(crate) fn next_read(&mut self) -> Option<(u8, u8)> {
-        if self.waits {
+    pub(crate) fn next_read(&mut self, now: Instant) -> Option<(u8, u8)> {
+        if now < self.due() {
             return None;
         }
-        self.waits = true;
-        self.held_meanwhile = 0;
-        self.rounds += 1;
-        if self.moving.is_none() {
-            return Some((MISSING_SERVOS.address, MOVING_JOINTS.address + 1 - MISSING_SERVOS.address));
+        if self.repeat_at.replace(now + REPEAT_PERIOD).is_some() {
+            self.is_brake_due = !self.is_finishing;
+        } else {
+            self.held_meanwhile = 0;
         }
-        let last = if self.is_fine { LIMITS } else { PRESENT_POSITION };
-        let first = self.rows().0.address;
-        Some((first, last.address + last.count - first))
+        let (first, last) = match self.moving {
+            _ if self.is_finishing => (MOTOR_STATE, SPEED),
+            None => (MISSING_SERVOS, MOVING_JOINTS),
+            Some(_) if self.is_fine => (FINE_TARGET, LIMITS),
+            Some(_) => (TARGET_POSITION, PRESENT_POSITION),
+        };
+        Some((first.address, last.address + last.count - first.address))
+    }
+
+    /// When [`Self::next_read`] has a read.
+    pub(crate) fn due(&self) -> Instant {
+        self.repeat_at.unwrap_or(Instant::ZERO)
+    }
+
+    /// Have all joints to be slowed down before the read that is sent now?
+    pub(crate) const fn take_brake(&mut self) -> bool {
+        std::mem::replace(&mut self.is_brake_due, false)
+    }
+
+    /// The arm holds: what is left are the speeds.
+    pub(crate) const fn finishing(mut self) -> Self {
+        (self.is_finishing, self.rounds) = (true, 0);
+        self
+    }
+
+    /// Are the speeds being restored?
+    pub(crate) const fn is_finishing(&self) -> bool {
+        self.is_finishing
+    }
+
+    /// The speeds were written, and have to be read.
+    pub(crate) const fn verify(&mut self) {
+        self.repeat_at = None;
+        self.rounds += 1;
     }
 
     /// The registers of the targets and of the positions.
@@ -118,9 +160,9 @@ impl ArmHold {
         if self.is_fine { (&FINE_TARGET, &FINE_POSITION) } else { (&TARGET_POSITION, &PRESENT_POSITION) }
     }
 
-    /// Is the hold over? Either the arm holds, or it was tried often enough.
+    /// Is this step over? Either it succeeded, or it was tried often enough.
     pub(crate) const fn is_over(&self) -> bool {
-        self.is_done || self.rounds >= MOST_ROUNDS
+        (self.is_done && !self.is_finishing) || self.rounds >= MOST_ROUNDS
     }
 
     /// Has the arm confirmed that it holds?
@@ -128,14 +170,10 @@ impl ArmHold {
         self.is_done && !self.has_unmeasured
     }
 
-    /// The reply did not come.
-    pub(crate) const fn note_no_reply(&mut self) {
-        self.waits = false;
-    }
-
     /// The frames to write for this reply.
     pub(crate) fn frames(&mut self, address: u8, values: &[u8], held: &HeldTargets) -> Vec<Frame> {
-        self.waits = false;
+        self.repeat_at = None;
+        self.rounds += 1;
         let Some(moving) = self.moving else {
             // The set-point of a silent joint stands still, and would go on to its target.
             let moving = values.iter().fold(0, |bits, value| bits | value);
@@ -210,114 +248,4 @@ impl ArmHold {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::super::intent::Intent;
-    use super::*;
-
-    /// Targets 1..14, and positions of which that of joint 3 was not measured.
-    fn values() -> Vec<u8> {
-        let mut values: Vec<u8> = (1..15).collect();
-        values.extend([21, 22, 23, 24, 0xFF, 0xFF, 25, 26, 27, 28, 29, 30, 31, 32]);
-        values
-    }
-
-    /// A hold that knows which joints move.
-    fn hold(moving: u8, is_streaming: bool) -> ArmHold {
-        let mut hold = ArmHold::new(true, is_streaming);
-        assert_eq!(hold.next_read(), Some((242, 2)));
-        assert_eq!(hold.next_read(), None);
-        assert_eq!(hold.frames(242, &[0, moving], &HeldTargets::default()), []);
-        hold
-    }
-
-    #[test]
-    fn joints_that_move_or_are_silent_get_their_positions() {
-        let mut hold = hold(0b111_0111, false);
-        assert!(!hold.is_over());
-        assert_eq!(hold.next_read(), Some((128, 61)));
-        let mut values = values();
-        let frames = hold.frames(128, &values, &HeldTargets::default());
-        assert_eq!(frames, [(128, vec![21, 22, 23, 24]), (136, vec![27, 28, 29, 30, 31, 32])]);
-        assert!(!hold.is_over());
-        assert_eq!(hold.next_read(), Some((128, 61)));
-        values[..4].copy_from_slice(&[21, 22, 23, 24]);
-        values[8..14].copy_from_slice(&[27, 28, 29, 30, 31, 32]);
-        assert_eq!(hold.frames(128, &values, &HeldTargets::default()), []);
-        assert!(hold.is_over());
-    }
-
-    #[test]
-    fn a_joint_that_moves_and_was_not_measured_is_not_held() {
-        for (moving, is_confirmed) in [(0b100, false), (0b1, true)] {
-            let mut hold = hold(moving, false);
-            for _ in 0..2 {
-                assert_eq!(hold.next_read(), Some((128, 61)));
-                let mut values = values();
-                values[..2].copy_from_slice(&[21, 22]);
-                hold.frames(128, &values, &HeldTargets::default());
-            }
-            assert!(hold.is_over());
-            assert_eq!(hold.is_confirmed(), is_confirmed, "{moving:b}");
-            let next = hold.for_unmeasured();
-            assert_eq!(next.as_ref().map(|next| next.repeats), (!is_confirmed).then_some(MOST_REPEATS - 1));
-            let last = next.map(|next| ArmHold { repeats: 0, has_unmeasured: true, ..next });
-            assert!(
-                last.is_none_or(|last| last.for_unmeasured().is_none()),
-                "others have to have their turns"
-            );
-        }
-    }
-
-    #[test]
-    fn d24_joints_that_have_reached_their_targets_keep_them() {
-        assert!(hold(0, false).is_over(), "nothing is read or written");
-        let mut hold = hold(0, true);
-        assert_eq!(hold.next_read(), Some((128, 61)));
-        let frames = hold.frames(128, &values(), &HeldTargets::default());
-        assert_eq!(frames, [(128, (1..15).collect())], "the end of a stream that has points left");
-    }
-
-    #[test]
-    fn an_arm_without_hundredths_is_held_in_whole_degrees() {
-        let mut hold = ArmHold::new(false, false);
-        assert_eq!(hold.next_read(), Some((46, 15)));
-        hold.note_no_reply();
-        assert!(!hold.is_over());
-        assert_eq!(hold.next_read(), Some((46, 15)));
-        let values = [9, 9, 9, 9, 9, 9, 9, 0, 1, 2, 3, 4, 5, 6, 7];
-        assert_eq!(hold.frames(46, &values, &HeldTargets::default()), [(46, vec![1, 2, 3, 4, 5, 6, 7])]);
-    }
-
-    #[test]
-    fn a_joint_that_brakes_towards_the_target_of_a_stop_keeps_it() {
-        let mut held = HeldTargets::default();
-        let targets = [Some(0x0201), None, None, None, None, None, None];
-        held.note_write(Intent::Stop, &targets);
-        let mut values = values();
-        values[14..16].copy_from_slice(&[1, 3]);
-        let mut braking = hold(0b1, false);
-        braking.next_read();
-        assert_eq!(braking.frames(128, &values, &held), []);
-        assert!(braking.is_over());
-        values[14..16].copy_from_slice(&[1, 9]);
-        let mut far = hold(0b1, false);
-        far.next_read();
-        assert_eq!(far.frames(128, &values, &held), [(128, vec![1, 9])], "it moves back from far away");
-        held.note_write(Intent::Motion, &[None; 7]);
-        values[14..16].copy_from_slice(&[1, 3]);
-        let mut moving = hold(0b1, false);
-        moving.next_read();
-        assert_eq!(moving.frames(128, &values, &held), [(128, vec![1, 3])], "it moves elsewhere");
-    }
-
-    #[test]
-    fn what_a_client_held_after_the_read_was_sent_is_not_overwritten() {
-        let mut held = HeldTargets::default();
-        let mut hold = hold(0b11, false);
-        hold.next_read();
-        let targets = [Some(0x1614), None, None, None, None, None, None];
-        held.note_write(Intent::Stop, &targets);
-        hold.note_held(&targets);
-        assert_eq!(hold.frames(128, &values(), &held), [(130, vec![23, 24])], "the other joint");
-    }
-}
+mod tests;

@@ -1,0 +1,110 @@
+//! Is a 7Bot V2 behind the port, and does it still answer?
+//!
+//! ```text
+//!   Absent ── the port opens ──▶ Identifying ── a 7Bot V2 answers ──▶ Present ── no reply for 3 s ─────▶ Silent
+//!     ▲                                                                  ▲                                 │
+//!     └── the port closes, from each state                               └──── a 7Bot V2 answers ──────────┘
+//! ```
+
+use protocol_core::registers::Map;
+use protocol_core::registers::map::FEEDBACK_FREQUENCY;
+use protocol_core::registers::map21::{ANGLE_FEEDBACK_FREQUENCY, LOAD_FEEDBACK_FREQUENCY};
+use protocol_core::time::{Duration, Instant};
+
+use super::Hub;
+use super::known_registers::KnownRegisters;
+use super::line::Owner;
+use super::presence::Presence;
+
+/// Time between two questions to a port behind which no arm has answered yet.
+const IDENTIFY_PERIOD: Duration = Duration::from_millis(250);
+
+/// Does an arm answer?
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum ArmState {
+    /// The port is closed.
+    Absent,
+    /// The port is open. The next question is due at this time.
+    Identifying(Instant),
+    /// A 7Bot V2 answered.
+    Present,
+    /// The port is open, and the arm answers no more. The next question is due at this time. It is still held: perhaps only
+    /// its replies are lost.
+    Silent(Instant),
+}
+
+impl Hub {
+    /// From now on the arm is asked once a second whether it answers, also while no client reads.
+    pub const fn watch_arm(&mut self) {
+        self.presence.is_watched = true;
+    }
+
+    /// Does the arm perhaps get what is sent to it, although it answers no more?
+    #[must_use]
+    pub const fn is_silent(&self) -> bool {
+        matches!(self.arm, ArmState::Silent(_))
+    }
+
+    /// Does a 7Bot V2 answer?
+    #[must_use]
+    pub fn has_arm(&self) -> bool {
+        self.arm == ArmState::Present
+    }
+
+    /// From now on only this arm counts, by its chip id.
+    pub fn expect_same_arm(&mut self) {
+        self.chip_id = Some(self.known.chip_id().to_vec());
+    }
+
+    /// The arm answers no more. Nothing is kept for it but a hold.
+    pub(super) fn lose_arm(&mut self, now: Instant) {
+        self.arm = ArmState::Silent(now);
+        self.line.end_reads();
+        self.drop_requests();
+    }
+
+    /// Asks what is behind the port, or whether the arm still answers, if that is due.
+    pub(super) fn ask_arm(&mut self, now: Instant) {
+        let due = self.question_due();
+        if now < due || !self.line.is_free(now) {
+            return;
+        }
+        let (owner, (address, count)) = match self.arm {
+            ArmState::Present => (Owner::Presence, Presence::QUESTION),
+            _ => (Owner::Identity, KnownRegisters::IDENTITY),
+        };
+        self.line.send_read(now, owner, address, count);
+        match &mut self.arm {
+            ArmState::Identifying(due) | ArmState::Silent(due) => *due = now + IDENTIFY_PERIOD,
+            ArmState::Absent | ArmState::Present => self.presence.ask(now),
+        }
+    }
+
+    /// When the next question to the arm is due.
+    pub(super) fn question_due(&self) -> Instant {
+        match self.arm {
+            ArmState::Absent => Instant::FAR_FUTURE,
+            ArmState::Identifying(due) | ArmState::Silent(due) => due,
+            ArmState::Present => self.presence.due(self.line.is_waiting()),
+        }
+    }
+
+    /// An unknown device answered, or a 7Bot V2. A stream that an earlier program left running ends.
+    pub(super) fn identify(&mut self, now: Instant, values: &[u8]) {
+        let Some(known) = KnownRegisters::of_arm(values) else { return };
+        let is_wanted = self.chip_id.as_deref().is_none_or(|id| known.chip_id() == id);
+        if is_wanted && self.arm != ArmState::Present {
+            self.arm = ArmState::Present;
+            let before = std::mem::replace(&mut self.known, known);
+            self.find_again(&before);
+            self.watchdog.forget();
+            if self.options.is_read_only {
+                return;
+            }
+            for register in [ANGLE_FEEDBACK_FREQUENCY, LOAD_FEEDBACK_FREQUENCY] {
+                self.line.send_write(now, Map::V21, register.address, &[0]);
+            }
+            self.line.send_write(now, Map::V22, FEEDBACK_FREQUENCY.address, &[0]);
+        }
+    }
+}

@@ -1,0 +1,200 @@
+//! How the hub holds the arm: the brake first, then the steps of [`ArmHold`], and at the end the speeds from before.
+//!
+//! ```text
+//!   read the speeds, write 1, read ──▶ no reply: again, every 100 ms
+//!     └─▶ a reply: the steps of the hold ──▶ the arm holds ──▶ restore the speeds, until they are read back
+//! ```
+//!
+//! Where the arm has to hold depends on a reply, and replies may be lost. So all joints are slowed down before the first
+//! one. The hub knows the speeds also if that of the speeds is lost: it read them when it found the arm, and all writes pass
+//! through it.
+
+use protocol_core::registers::map::{MOTOR_STATE, SET_POINT_PERIOD, SPEED, motor_state};
+use protocol_core::registers::{JOINTS, Map};
+use protocol_core::time::Instant;
+
+use super::Hub;
+use super::arm_hold::ArmHold;
+use super::intent::Intent;
+use super::known_registers::KnownRegisters;
+use super::line::Owner;
+use super::watchdog::WatchdogAction;
+
+/// The slowest speed, 1.9 degrees/s. It acts on moves that go on ([D11](protocol_core::decisions#d11)), and bounds streams
+/// ([D23](protocol_core::decisions#d23)).
+const BRAKE: [u8; JOINTS] = [1; JOINTS];
+
+/// How an arm is after a hold of the hub.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum HoldOutcome {
+    /// Its joints hold where they are.
+    Holds,
+    /// Its motors are off.
+    Limp,
+    /// It has not confirmed the hold: it may be moving.
+    Unconfirmed,
+}
+
+impl Hub {
+    /// Holds the arm; after the hold in progress, if that still slows the joints down.
+    pub(super) fn start_hold(&mut self) {
+        self.hold_outcome = None;
+        if let Some(hold) = self.hold.as_mut().filter(|hold| !hold.is_finishing()) {
+            return hold.want_again();
+        }
+        self.line.cancel_reads(Owner::Hold);
+        let is_streaming = self.known.word(SET_POINT_PERIOD.address) != 0;
+        self.hold = Some(ArmHold::new(self.known.is_ours(), is_streaming));
+    }
+
+    /// Is the hub about to hold the arm by itself?
+    #[must_use]
+    pub const fn is_holding(&self) -> bool {
+        self.hold.is_some()
+    }
+
+    /// What came of the last hold of the hub; `None`: nothing yet.
+    #[must_use]
+    pub const fn hold_outcome(&self) -> Option<HoldOutcome> {
+        self.hold_outcome
+    }
+
+    fn end_hold(&mut self, outcome: HoldOutcome) {
+        self.hold_outcome = Some(outcome);
+        self.news.extend(self.clients.keys());
+    }
+
+    /// The watchdog of a client acts.
+    pub(super) fn act(&mut self, now: Instant, action: WatchdogAction) {
+        match action {
+            WatchdogAction::Hold => self.start_hold(),
+            WatchdogAction::Damp => {
+                self.note_targets(Intent::MotorsOff, Map::V22, MOTOR_STATE.address, &[]);
+                self.write_arm(now, MOTOR_STATE.address, &[motor_state::DAMPING]);
+            }
+        }
+    }
+
+    /// Sends the next frames of the hold in progress.
+    pub(super) fn send_hold(&mut self, now: Instant) {
+        let Some(hold) = &mut self.hold else { return };
+        let Some((address, count)) = hold.next_read(now) else { return };
+        if self.line.is_stuck() {
+            return;
+        }
+        if hold.take_brake() {
+            // `known` keeps the speeds from before.
+            self.is_slowed = true;
+            self.line.send_read(now, Owner::Speeds, SPEED.address, SPEED.count);
+            self.line.send_write(now, Map::V22, SPEED.address, &BRAKE);
+        }
+        self.line.send_read(now, Owner::Hold, address, count);
+    }
+
+    /// The speeds directly before a brake. The hub does not notice each restart of the arm, so its own may be out of date.
+    pub(super) fn note_speeds(&mut self, found: &[u8]) {
+        let speeds = restored(found, self.known.speeds());
+        self.known.set_speeds(&speeds);
+    }
+
+    /// Writes registers by itself.
+    fn write_arm(&mut self, now: Instant, address: u8, values: &[u8]) {
+        self.known.write(Map::V22, address, values);
+        self.line.send_write(now, Map::V22, address, values);
+    }
+
+    /// Takes a reply for the hold in progress. Other reads of it may be on their way: they show an older state.
+    pub(super) fn continue_hold(&mut self, now: Instant, address: u8, values: &[u8]) {
+        let Some(mut hold) = self.hold.take() else { return };
+        self.line.cancel_reads(Owner::Hold);
+        if hold.is_finishing() {
+            return self.finish_hold(now, hold, address, values);
+        }
+        let frames = hold.frames(address, values, &self.held);
+        self.write_targets(now, &frames);
+        match hold.is_over() {
+            false => self.hold = Some(hold),
+            true if hold.is_wanted_again() => self.start_hold(),
+            true if let Some(next) = hold.for_unmeasured() => self.hold = Some(next),
+            true if hold.is_confirmed() => self.hold = Some(hold.finishing()),
+            // The joints stay slow: the arm may be moving.
+            true => self.end_hold(HoldOutcome::Unconfirmed),
+        }
+    }
+
+    /// Writes the targets that hold the arm. A set-point period would delay them.
+    fn write_targets(&mut self, now: Instant, frames: &[(u8, Vec<u8>)]) {
+        let period = self.known.word(SET_POINT_PERIOD.address);
+        let is_delayed = !frames.is_empty() && period != 0;
+        if is_delayed {
+            self.write_arm(now, SET_POINT_PERIOD.address, &[0, 0]);
+        }
+        for (address, values) in frames {
+            self.note_targets(Intent::Hold, Map::V22, *address, values);
+            self.write_arm(now, *address, values);
+        }
+        if is_delayed {
+            self.write_arm(now, SET_POINT_PERIOD.address, &period.to_le_bytes());
+        }
+    }
+
+    /// The arm holds: restores the speeds, until none is that of the brake.
+    fn finish_hold(&mut self, now: Instant, mut hold: ArmHold, address: u8, values: &[u8]) {
+        if let Some(speeds) = self.speeds_to_restore(address, values).filter(|_| !hold.is_over()) {
+            self.line.send_write(now, Map::V22, SPEED.address, &speeds);
+            hold.verify();
+            self.hold = Some(hold);
+            return;
+        }
+        self.is_slowed = false;
+        let place = MOTOR_STATE.address.checked_sub(address).map(usize::from);
+        let state = place.and_then(|place| values.get(place));
+        self.end_hold(match state {
+            Some(&motor_state::SERVO) => HoldOutcome::Holds,
+            _ => HoldOutcome::Limp,
+        });
+    }
+
+    /// The speeds to write; `None` if no joint has the speed of the brake.
+    fn speeds_to_restore(&self, address: u8, values: &[u8]) -> Option<Vec<u8>> {
+        let start = usize::from(SPEED.address.checked_sub(address)?);
+        let found = values.get(start..start + BRAKE.len())?;
+        let wanted = restored(found, self.known.speeds());
+        (wanted != found).then_some(wanted)
+    }
+
+    /// Replaces the speeds of the brake in a reply to a client: a client that remembers them would restore them later.
+    pub(super) fn overlay_speeds(&self, address: u8, values: &mut [u8]) {
+        if self.hold.is_none() {
+            return;
+        }
+        for (register, value) in
+            (address..=u8::MAX).zip(values).filter(|(register, _)| SPEED.holds(*register))
+        {
+            *value = self.known.byte(register);
+        }
+    }
+
+    /// An arm was found; `before` are the registers of the last one. If a hold of the same arm was interrupted, its joints may
+    /// be slow: it is held anew, and that restores their speeds.
+    pub(super) fn find_again(&mut self, before: &KnownRegisters) {
+        let is_same = self.known.chip_id() == before.chip_id();
+        if !is_same {
+            self.hold = None;
+        }
+        let speeds = restored(self.known.speeds(), before.speeds());
+        let was_slowed = std::mem::take(&mut self.is_slowed);
+        if was_slowed && is_same && speeds != self.known.speeds() {
+            self.known.set_speeds(&speeds);
+            self.is_slowed = true;
+            self.start_hold();
+        }
+    }
+}
+
+/// The speeds without the brake. A joint that was found with another speed did not get the brake, got a speed of a client since, or
+/// belongs to an arm that restarted.
+fn restored(found: &[u8], before: &[u8]) -> Vec<u8> {
+    let rows = found.iter().zip(BRAKE).zip(before);
+    rows.map(|((&found, brake), &before)| if found == brake { before } else { found }).collect()
+}

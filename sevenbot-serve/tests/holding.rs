@@ -1,0 +1,215 @@
+//! A hold of the server slows the joints down before it knows where they are, and restores their speeds; replies and requests are lost.
+
+#![allow(clippy::expect_used, clippy::indexing_slicing, clippy::unwrap_used)] // A panic is a failed test.
+
+mod rig;
+
+use protocol_core::registers::Joint;
+use protocol_core::registers::map::{
+    FINE_TARGET, HOST_WATCHDOG, MOTOR_STATE, MOVING_JOINTS, SPEED, TARGET_POSITION, motor_state,
+};
+use rand_xoshiro::Xoshiro256PlusPlus;
+use rand_xoshiro::rand_core::{Rng, SeedableRng};
+use rig::{World, read, write};
+
+const COMMAND: u8 = 239;
+const SPEEDS: [u8; 7] = [100, 90, 80, 70, 60, 50, 0];
+
+/// The ways to a hold of the server.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Way {
+    Command,
+    Watchdog,
+    Page,
+}
+
+const WAYS: [Way; 3] = [Way::Command, Way::Watchdog, Way::Page];
+
+/// Program 0 moves joint 1 at 190 degrees per second.
+fn moving_world() -> World {
+    let mut world = World::new(3);
+    world.join_page();
+    world.send(0, &[write(SPEED.address, &SPEEDS), write(TARGET_POSITION.address, &[20])].concat());
+    world.run(1_500);
+    world.send(0, &write(TARGET_POSITION.address, &[160]));
+    world.run(250);
+    world
+}
+
+fn begin_hold(world: &mut World, way: Way) {
+    match way {
+        Way::Command => world.send(1, &write(COMMAND, &[1])),
+        // A watchdog of 10 ms, and then silence.
+        Way::Watchdog => world.send(2, &write(HOST_WATCHDOG.address, &[1])),
+        Way::Page => world.send_message(0, r#"{"cmd":"stop"}"#),
+    }
+}
+
+fn speeds(world: &World) -> Vec<u8> {
+    world.arm.registers().read(SPEED.address, SPEED.count).to_vec()
+}
+
+/// Where joint 1 is, in hundredths of a degree. The line is not needed for it.
+fn position(world: &World) -> i32 {
+    world.arm.plant().angle(Joint::ALL[0]) / 10
+}
+
+#[test]
+fn a_hold_slows_the_joints_down_although_no_reply_comes() {
+    for way in WAYS {
+        let mut world = moving_world();
+        world.loses_replies = true;
+        begin_hold(&mut world, way);
+        world.run(150);
+        assert_eq!(speeds(&world), [1; 7], "{way:?}");
+        let braked = position(&world);
+        world.run(8_000);
+        let crept = position(&world) - braked;
+        assert!(crept < 2_000, "{way:?}: by {crept} hundredths in 8 s, at 1.9 degrees per second");
+        world.loses_replies = false;
+        world.run(1_000);
+        assert_eq!(speeds(&world), SPEEDS, "{way:?}: restored");
+        let held = position(&world);
+        world.run(2_000);
+        assert!((position(&world) - held).abs() <= 60, "{way:?}: it rests");
+        assert!(held < 15_000, "{way:?}: on its way");
+    }
+}
+
+#[test]
+fn the_brake_is_repeated_until_the_arm_confirms_the_hold() {
+    for way in WAYS {
+        let mut world = moving_world();
+        (world.loses_replies, world.loses_requests) = (true, true);
+        begin_hold(&mut world, way);
+        world.run(80);
+        world.loses_requests = false;
+        world.run(150);
+        assert_eq!(speeds(&world), [1; 7], "{way:?}");
+    }
+}
+
+#[test]
+fn a_silent_arm_can_still_be_stopped() {
+    for way in [Way::Command, Way::Page] {
+        let mut world = moving_world();
+        world.loses_replies = true;
+        world.send(0, &[write(SPEED.address, &[2; 7]), read(0, 7)].concat());
+        world.run(5_000);
+        assert!(!world.hub.has_arm());
+        world.sent.clear();
+        begin_hold(&mut world, way);
+        world.run(50);
+        assert_eq!(speeds(&world), [1; 7], "{way:?}");
+        world.send(0, &write(MOTOR_STATE.address, &[motor_state::FORCELESS]));
+        world.run(50);
+        assert_eq!(world.arm.registers().get(MOTOR_STATE.address), motor_state::FORCELESS);
+    }
+}
+
+#[test]
+fn a_hold_of_an_arm_that_stands_changes_nothing() {
+    for way in WAYS {
+        let mut world = moving_world();
+        world.run(3_000);
+        let targets = |world: &World| world.arm.registers().read(FINE_TARGET.address, 14).to_vec();
+        let before = (targets(&world), speeds(&world));
+        begin_hold(&mut world, way);
+        world.run(100);
+        assert_eq!((targets(&world), speeds(&world)), before, "{way:?}");
+        assert!(!world.hub.is_holding());
+    }
+}
+
+#[test]
+fn holds_on_holds_restore_the_speeds_of_before_the_first() {
+    let mut world = moving_world();
+    for turn in 0..200 {
+        begin_hold(&mut world, WAYS[turn % 2]);
+        world.advance(7 * u64::try_from(turn).unwrap() % 90);
+    }
+    world.run(200);
+    assert_eq!(speeds(&world), SPEEDS);
+}
+
+#[test]
+fn an_arm_that_restarts_during_a_hold_has_the_speeds_of_power_up() {
+    for millis in [10, 500, 6_000] {
+        let mut world = moving_world();
+        world.loses_replies = true;
+        begin_hold(&mut world, Way::Command);
+        world.run(300);
+        world.power_cycle();
+        world.loses_requests = true;
+        world.run(millis);
+        (world.loses_replies, world.loses_requests) = (false, false);
+        world.run(2_000);
+        assert_eq!(speeds(&world), SPEED.default_bytes(), "{millis} ms");
+        assert!(!world.hub.is_holding());
+    }
+}
+
+/// The port is lost in the middle of a hold, and the arm stays slow until the port is open again.
+#[test]
+fn a_hold_that_an_outage_interrupted_is_done_anew() {
+    let mut world = moving_world();
+    world.loses_replies = true;
+    begin_hold(&mut world, Way::Command);
+    world.run(200);
+    world.unplug();
+    world.run(1_000);
+    world.loses_replies = false;
+    world.plug();
+    world.run(1_000);
+    assert_eq!(speeds(&world), SPEEDS);
+    assert!(position(&world) < 15_000);
+    world.run(3_000);
+    assert_eq!(world.arm.registers().get(MOVING_JOINTS.address), 0);
+    assert!(position(&world) < 15_000, "it rests on its way");
+}
+
+/// A program that stops the arm remembers the speeds which it reads, and restores them later.
+#[test]
+fn a_program_reads_its_speeds_and_not_those_of_the_brake() {
+    let mut world = moving_world();
+    for steps in 0..200 {
+        world.take(1);
+        begin_hold(&mut world, Way::Command);
+        world.send(1, &read(SPEED.address, 7));
+        world.advance(steps);
+        world.send(1, &read(SPEED.address, 7));
+        world.run(50);
+        let replies = world.take(1);
+        assert!(!replies.is_empty() && replies.iter().all(|(_, values)| *values == SPEEDS), "{replies:?}");
+    }
+    world.loses_replies = true;
+    begin_hold(&mut world, Way::Command);
+    world.run(200);
+    world.send(1, &write(SPEED.address, &[33]));
+    world.run(200);
+    assert_eq!(speeds(&world)[0], 1, "the brake is repeated");
+    world.loses_replies = false;
+    world.run(500);
+    assert_eq!(speeds(&world)[..2], [33, 90]);
+}
+
+#[test]
+fn a_hold_is_confirmed_whatever_is_lost() {
+    for seed in 0..30_u64 {
+        let mut world = moving_world();
+        let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
+        begin_hold(&mut world, WAYS[usize::try_from(seed % 3).unwrap()]);
+        for _ in 0..300 {
+            world.loses_replies = random.next_u64() % 2 == 0;
+            world.loses_requests = random.next_u64() % 3 == 0;
+            world.run(2 + random.next_u64() % 10);
+        }
+        (world.loses_replies, world.loses_requests) = (false, false);
+        world.run(500);
+        assert_eq!(speeds(&world), SPEEDS, "seed {seed}");
+        let held = position(&world);
+        world.run(2_000);
+        assert!((position(&world) - held).abs() <= 60, "seed {seed}: it moves on from {held}");
+        assert!(held < 15_900, "seed {seed}: on its way: {held}");
+    }
+}
