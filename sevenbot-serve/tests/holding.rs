@@ -213,3 +213,28 @@ fn a_hold_is_confirmed_whatever_is_lost() {
         assert!(held < 15_900, "seed {seed}: on its way: {held}");
     }
 }
+
+#[test]
+fn the_makers_stop_does_not_wait_for_the_commands_before_it() {
+    for waiting in [r#"{"cmd":"read","id":54,"num":7}"#, r#"{"cmd":"IK6","pos":[0,250,100],"d56":[0,0,-1]}"#]
+    {
+        let mut world = moving_world();
+        world.loses_replies = true;
+        world.send_message(0, waiting);
+        world.run(30);
+        for message in [r#"{"cmd":"angle","id":0,"angle":165}"#, r#"{"cmd":"ping"}"#, r#"{"cmd":"stop"}"#] {
+            world.send_message(0, message);
+        }
+        world.run(20);
+        assert_eq!(speeds(&world), [1; 7], "{waiting}");
+        assert_ne!(world.arm.registers().get(TARGET_POSITION.address), 165);
+        world.loses_replies = false;
+        world.run(4_000);
+        let answers: Vec<_> = world.pages[0].answers.iter().map(|(_, answer)| answer.as_str()).collect();
+        let expected = ["", "A stop came after this command", "pong", "Stopped"];
+        assert_eq!(answers.len(), expected.len(), "{answers:?}");
+        assert!(answers.iter().zip(expected).all(|(answer, text)| answer.contains(text)), "{answers:?}");
+        assert_ne!(world.arm.registers().get(TARGET_POSITION.address), 165);
+        assert_eq!(speeds(&world), SPEEDS);
+    }
+}

@@ -1,5 +1,7 @@
 //! A client of the maker's WebSocket: its commands one after the other, and the answers in their order.
 //!
+//! A stop is carried out when it comes, and drops the commands before it that move the arm. Only its answer keeps its place.
+//!
 //! A read is always answered. All other commands are answered only to a browser: the maker's Python client does not wait
 //! for their answers, and takes the next message for the answer to its next read.
 
@@ -17,13 +19,24 @@ use crate::hub::{Admission, ClientId, Event, HoldOutcome, Hub, MOST_WAITING, Who
 /// Answers that may wait for a client to take them. Its commands wait meanwhile.
 const MOST_ANSWERS: usize = 8;
 
+/// What waits for its turn.
+#[derive(Debug)]
+enum Waiting {
+    /// It was sent at this time at the earliest.
+    Command(Instant, MakerCommand),
+    Wrong(MakerCommandError),
+    /// A stop that was carried out, and waits for its answer.
+    Stopped(Admission),
+    /// A stop came after this command.
+    Dropped,
+}
+
 /// A client of the maker's WebSocket.
 #[derive(Debug)]
 pub struct MakerClient {
     id: ClientId,
     is_browser: bool,
-    /// Each with the time at which it was sent at the earliest.
-    waiting: VecDeque<(Instant, Result<MakerCommand, MakerCommandError>)>,
+    waiting: VecDeque<Waiting>,
     /// The command that has not ended: its read has no reply yet, or the arm has not confirmed the stop.
     current: Option<MakerCommand>,
     /// The first of two events that the command waits for.
@@ -60,7 +73,10 @@ impl MakerClient {
 
     /// Takes a message that was sent at `since` or later. Call it only if [`MakerClient::has_room`].
     pub fn message(&mut self, since: Instant, text: &str) {
-        self.waiting.push_back((since, MakerCommand::parse(text)));
+        self.waiting.push_back(match MakerCommand::parse(text) {
+            Ok(command) => Waiting::Command(since, command),
+            Err(error) => Waiting::Wrong(error),
+        });
     }
 
     /// Carries out commands, as far as possible. Call it after messages, after [`Hub::poll`] and [`Hub::arm_bytes`].
@@ -68,12 +84,43 @@ impl MakerClient {
         while let Some(event) = hub.take_event(self.id) {
             self.finish_read(event);
         }
-        if matches!(self.current, Some(MakerCommand::Stop)) {
-            self.finish_stop(hub);
+        self.stop_at_once(hub, now);
+        loop {
+            if matches!(self.current, Some(MakerCommand::Stop)) {
+                self.finish_stop(hub);
+            }
+            if self.current.is_some() || self.answers.len() >= MOST_ANSWERS || !hub.has_room(self.id) {
+                return;
+            }
+            match self.waiting.pop_front() {
+                None => return,
+                Some(Waiting::Command(since, command)) => self.start(hub, now, since, command),
+                Some(Waiting::Wrong(MakerCommandError { message, is_read })) => {
+                    self.answer(is_read, &error(&message));
+                }
+                Some(Waiting::Stopped(Admission::Queued)) => self.current = Some(MakerCommand::Stop),
+                Some(Waiting::Stopped(refused)) => self.answer(false, &done_or_refused("", refused)),
+                Some(Waiting::Dropped) => self.answer(false, &error("A stop came after this command")),
+            }
         }
-        while self.current.is_none() && self.answers.len() < MOST_ANSWERS && hub.has_room(self.id) {
-            let Some((since, command)) = self.waiting.pop_front() else { return };
-            self.start(hub, now, since, command);
+    }
+
+    /// Carries out the stops that wait, and drops what moves the arm before them.
+    fn stop_at_once(&mut self, hub: &mut Hub, now: Instant) {
+        let is_stop = |waiting: &Waiting| matches!(waiting, Waiting::Command(_, MakerCommand::Stop));
+        let Some(last) = self.waiting.iter().rposition(is_stop) else { return };
+        let admission = hub.stop_arm(now, self.id);
+        for waiting in self.waiting.iter_mut().take(last + 1) {
+            match waiting {
+                Waiting::Command(_, MakerCommand::Stop) => *waiting = Waiting::Stopped(admission),
+                Waiting::Command(_, command)
+                    if admission == Admission::Queued
+                        && request(command).is_some_and(|it| hub.moves_arm(now, self.id, &it)) =>
+                {
+                    *waiting = Waiting::Dropped;
+                }
+                _ => {}
+            }
         }
     }
 
@@ -82,44 +129,22 @@ impl MakerClient {
         self.answers.pop_front()
     }
 
-    fn start(
-        &mut self,
-        hub: &mut Hub,
-        now: Instant,
-        since: Instant,
-        command: Result<MakerCommand, MakerCommandError>,
-    ) {
-        match command {
-            Err(MakerCommandError { message, is_read }) => self.answer(is_read, &error(&message)),
-            Ok(MakerCommand::Ping) => {
-                self.answer(false, &json!({"status": "pong", "timestamp": now.as_micros() / 1_000}));
-            }
-            Ok(MakerCommand::Write { address, values, done }) => {
-                let admission = hub.request(now, self.id, since, write(address, values));
+    fn start(&mut self, hub: &mut Hub, now: Instant, since: Instant, command: MakerCommand) {
+        let Some(request) = request(&command) else {
+            return self.answer(false, &json!({"status": "pong", "timestamp": now.as_micros() / 1_000}));
+        };
+        let admission = hub.request(now, self.id, since, request);
+        match (command, admission) {
+            (MakerCommand::Write { done, .. }, admission) => {
                 self.answer(false, &done_or_refused(done, admission));
             }
-            Ok(MakerCommand::Read { address, count }) => {
-                hub.request(now, self.id, since, WholeRequest::Read { address, count });
-                self.current = Some(MakerCommand::Read { address, count });
+            (MakerCommand::InverseKinematics { .. }, refused)
+                // These still end, with two events.
+                if !matches!(refused, Admission::Queued | Admission::NoArm) =>
+            {
+                self.answer(false, &done_or_refused("", refused));
             }
-            Ok(MakerCommand::InverseKinematics { address, values }) => {
-                let request = WholeRequest::WritesBetweenReads {
-                    map: Map::V21,
-                    writes: solving_writes(address, &values),
-                    read: (FRAMES_REFUSED.address, FRAMES_REFUSED.count),
-                };
-                match hub.request(now, self.id, since, request) {
-                    // It still ends, with two events.
-                    Admission::Queued | Admission::NoArm => {
-                        self.current = Some(MakerCommand::InverseKinematics { address, values });
-                    }
-                    refused => self.answer(false, &done_or_refused("", refused)),
-                }
-            }
-            Ok(MakerCommand::Stop) => match hub.stop_arm(now, self.id) {
-                Admission::Queued => self.current = Some(MakerCommand::Stop),
-                refused => self.answer(false, &done_or_refused("", refused)),
-            },
+            (command, _) => self.current = Some(command),
         }
     }
 
@@ -128,7 +153,7 @@ impl MakerClient {
         let answer = match hub.hold_outcome() {
             Some(HoldOutcome::Holds | HoldOutcome::Limp) => message("Stopped"),
             Some(HoldOutcome::Unconfirmed) => error("The arm did not confirm the stop: it may be moving"),
-            None if !hub.has_arm() => error("The arm does not answer"),
+            None if !hub.has_arm() || !hub.is_holding() => error("The arm does not answer"),
             None => return,
         };
         self.current = None;
@@ -162,6 +187,20 @@ impl MakerClient {
             self.answers.push_back(answer.to_string());
         }
     }
+}
+
+/// What the command asks of the arm.
+fn request(command: &MakerCommand) -> Option<WholeRequest> {
+    Some(match command {
+        MakerCommand::Ping | MakerCommand::Stop => return None,
+        MakerCommand::Write { address, values, .. } => write(*address, values.clone()),
+        &MakerCommand::Read { address, count } => WholeRequest::Read { address, count },
+        MakerCommand::InverseKinematics { address, values } => WholeRequest::WritesBetweenReads {
+            map: Map::V21,
+            writes: solving_writes(*address, values),
+            read: (FRAMES_REFUSED.address, FRAMES_REFUSED.count),
+        },
+    })
 }
 
 /// Function 04, so that offsets have the forms of the maker's programs ([M5](protocol_core::decisions#m5)).
