@@ -11,27 +11,13 @@ use protocol_core::registers::map::FEEDBACK_FREQUENCY;
 use protocol_core::registers::map21::{ANGLE_FEEDBACK_FREQUENCY, LOAD_FEEDBACK_FREQUENCY};
 use protocol_core::time::{Duration, Instant};
 
-use super::Hub;
 use super::known_registers::KnownRegisters;
 use super::line::Owner;
 use super::presence::Presence;
+use super::{ArmState, Hub};
 
 /// Time between two questions to a port behind which no arm has answered yet.
 const IDENTIFY_PERIOD: Duration = Duration::from_millis(250);
-
-/// Does an arm answer?
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum ArmState {
-    /// The port is closed.
-    Absent,
-    /// The port is open. The next question is due at this time.
-    Identifying(Instant),
-    /// A 7Bot V2 answered.
-    Present,
-    /// The port is open, and the arm answers no more. The next question is due at this time. It is still held: perhaps only
-    /// its replies are lost.
-    Silent(Instant),
-}
 
 impl Hub {
     /// From now on the arm is asked once a second whether it answers, also while no client reads.

@@ -43,7 +43,6 @@ use std::collections::{BTreeMap, BTreeSet};
 use protocol_core::time::Instant;
 
 use self::arm_hold::ArmHold;
-use self::arm_state::ArmState;
 use self::client::Client;
 use self::drive::Driver;
 use self::held_targets::HeldTargets;
@@ -68,6 +67,20 @@ pub struct HubOptions {
     pub is_read_only: bool,
     /// Only one client moves the arm at a time.
     pub has_one_driver: bool,
+}
+
+/// Does an arm answer?
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum ArmState {
+    /// The port is closed.
+    Absent,
+    /// The port is open. The next question is due at this time.
+    Identifying(Instant),
+    /// A 7Bot V2 answered.
+    Present,
+    /// The port is open, and the arm answers no more. The next question is due at this time. It is still held: perhaps only
+    /// its replies are lost.
+    Silent(Instant),
 }
 
 /// The clients of one arm, and the line to it.
