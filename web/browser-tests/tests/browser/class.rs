@@ -116,9 +116,15 @@ fn a_wrong_code_and_a_lost_class_are_told() {
     assert_eq!(page.evaluate("document.querySelector('#class-name').value"), "Mia Lee");
     page.type_into("#class-code", "robots7");
     page.wait_for_text("#class-state", "You are in the class as Mia Lee");
+    let mut teacher = page.open_beside(&class.teacher, BLOCK_STORAGE);
+    teacher.wait_for_text("#join", "class code robots7");
+    teacher.click("[data-action=language]");
+    teacher.click("[data-action=language]");
+    assert_eq!(teacher.errors(), [""; 0]);
     drop(class);
     page.wait_for_text("#class-state", "The connection to the class was lost. Trying again");
     page.wait_until_ready();
+    teacher.wait_for_text("#state", "If it was started again, open the new address that it printed.");
 }
 
 #[test]
@@ -172,6 +178,12 @@ fn the_real_arm_is_given_driven_and_taken_back() {
         assert_eq!(page.errors(), [""; 0]);
     }
 }
+
+/// A browser that keeps nothing throws where its storage is used.
+const BLOCK_STORAGE: &str = "
+    for (const name of ['localStorage', 'sessionStorage']) {
+      Object.defineProperty(window, name, { get() { throw new Error('blocked'); } });
+    }";
 
 /// Keeps the WebSockets of the page in `window.sockets`.
 const KEEP_SOCKETS: &str = "
