@@ -345,7 +345,6 @@ def test_a_stopped_sample_and_a_stopped_recording_say_so(simulated_arm: sevenbot
     assert isinstance(sampled, sevenbot.Interrupted)
     recorded = stopped(simulated_arm, lambda: simulated_arm.record(80_000))
     assert isinstance(recorded, sevenbot.Interrupted)
-    assert recorded.recording is not None and len(recorded.recording) > 10, "nothing is lost"
 
 
 def test_a_recording_that_fails_late_keeps_what_it_has(simulated_arm: sevenbot.SimulatedArm) -> None:
