@@ -14,7 +14,7 @@ use crate::servo::{Servo, Trip};
 pub const HIGHEST_STIFFNESS: u16 = 5_000;
 /// The greatest torque of a hand, in millinewton metres.
 pub const STRONGEST_PUSH: i16 = 10_000;
-/// A thing that the claws have touched falls when they open beyond it by this, in thousandths of a degree.
+/// A thing that the claws have touched falls when they open beyond it by this, in thousandths of a degree. Assumed.
 const DROP_DISTANCE: i64 = 2_000;
 /// The joint of the claws.
 const CLAW: Joint = Joint::ALL[6];

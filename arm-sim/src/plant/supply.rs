@@ -8,11 +8,11 @@ use protocol_core::time::{Duration, Instant};
 use crate::fault_count::FaultCount;
 use crate::servo::units::STEP;
 
-/// The supply voltage without load, in 0.1 V.
+/// The supply voltage without load, in 0.1 V: the nominal voltage of the servos.
 const NOMINAL_DECIVOLTS: u16 = 74;
-/// The voltage drop for each servo with full load, in 0.1 V.
+/// The voltage drop for each servo with full load, in 0.1 V. Assumed.
 const DROP_DECIVOLTS: u16 = 3;
-/// The voltage during a dip, in 0.1 V. Each servo restarts.
+/// The voltage during a dip, in 0.1 V. Each servo restarts. Assumed, as its duration.
 const DIP_DECIVOLTS: u16 = 30;
 /// The duration of a dip.
 const DIP: Duration = Duration::from_millis(20);
