@@ -242,7 +242,7 @@ fn thirty_tabs_stop_together() {
     let mut millis: Vec<u64> = Vec::new();
     let end = Instant::now() + Duration::from_secs(seconds);
     while Instant::now() < end {
-        let to = if millis.len() % 2 == 0 { "End" } else { "Home" };
+        let to = if millis.len().is_multiple_of(2) { "End" } else { "Home" };
         for page in &mut pupils {
             page.focus("#joint-1");
             page.key(to);
