@@ -5,7 +5,7 @@ use classroom::LentArm;
 use super::class_socket::ClassSocket;
 use crate::class::Membership;
 
-/// The class asks a tab that does not answer each 8 s, and others more often.
+/// The class asks a tab that does not answer each 4 s, and others more often.
 const SILENCE_MS: f64 = 10_000.0;
 /// The most that one picture adds to a silence, in milliseconds.
 const LONGEST_PICTURE_MS: f64 = 1_000.0;
