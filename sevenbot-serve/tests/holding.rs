@@ -193,6 +193,45 @@ fn a_program_reads_its_speeds_and_not_those_of_the_brake() {
     assert_eq!(speeds(&world)[..2], [33, 90]);
 }
 
+/// The hold reads the speeds and restores them. A program writes one again and again meanwhile.
+#[test]
+fn a_speed_that_a_program_writes_during_a_hold_is_kept() {
+    let mut world = moving_world();
+    for steps in 0..250_u8 {
+        begin_hold(&mut world, Way::Command);
+        let (joint, speed) = (steps % 7, 2 + steps % 90);
+        for _ in 0..steps / 10 {
+            world.send(0, &write(SPEED.address + joint, &[speed + 1]));
+            world.advance(10);
+        }
+        world.advance((steps % 10).into());
+        world.send(0, &write(SPEED.address + joint, &[speed]));
+        world.run(60);
+        assert!(!world.hub.is_holding());
+        assert_eq!(speeds(&world)[usize::from(joint)], speed, "{steps} steps of 0.1 ms after the hold began");
+        assert!(speeds(&world).iter().all(|&speed| speed != 1));
+    }
+}
+
+/// The first hold is at each of its steps when no reply comes any more, also at the end, where it restores the speeds.
+#[test]
+fn a_stop_slows_the_joints_down_at_each_step_of_a_hold_before_it() {
+    for steps in (0..400).step_by(3) {
+        let mut world = moving_world();
+        begin_hold(&mut world, Way::Command);
+        world.advance(steps);
+        world.loses_replies = true;
+        world.run(10);
+        let moves =
+            [write(COMMAND, &[2]), write(SPEED.address, &SPEEDS), write(TARGET_POSITION.address, &[170])];
+        world.send(0, &moves.concat());
+        world.run(30);
+        begin_hold(&mut world, Way::Command);
+        world.run(110);
+        assert_eq!(speeds(&world), [1; 7], "{steps} steps of 0.1 ms after the first hold began");
+    }
+}
+
 #[test]
 fn a_hold_is_confirmed_whatever_is_lost() {
     for seed in 0..30_u64 {

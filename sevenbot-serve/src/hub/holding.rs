@@ -14,7 +14,7 @@ use protocol_core::registers::{JOINTS, Map};
 use protocol_core::time::Instant;
 
 use super::Hub;
-use super::arm_hold::ArmHold;
+use super::arm_hold::{ArmHold, Frame, joined};
 use super::intent::Intent;
 use super::known_registers::KnownRegisters;
 use super::line::Owner;
@@ -22,7 +22,7 @@ use super::watchdog::WatchdogAction;
 
 /// The slowest speed, 1.9 degrees/s. It acts on moves that go on ([D11](protocol_core::decisions#d11)), and bounds streams
 /// ([D23](protocol_core::decisions#d23)).
-const BRAKE: [u8; JOINTS] = [1; JOINTS];
+const BRAKE: u8 = 1;
 
 /// How an arm is after a hold of the hub.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -86,7 +86,7 @@ impl Hub {
             // `known` keeps the speeds from before.
             self.is_slowed = true;
             self.line.send_read(now, Owner::Speeds, SPEED.address, SPEED.count);
-            self.line.send_write(now, Map::V22, SPEED.address, &BRAKE);
+            self.line.send_write(now, Map::V22, SPEED.address, &[BRAKE; JOINTS]);
         }
         self.line.send_read(now, Owner::Hold, address, count);
     }
@@ -123,7 +123,7 @@ impl Hub {
     }
 
     /// Writes the targets that hold the arm. A set-point period would delay them.
-    fn write_targets(&mut self, now: Instant, frames: &[(u8, Vec<u8>)]) {
+    fn write_targets(&mut self, now: Instant, frames: &[Frame]) {
         let period = self.known.word(SET_POINT_PERIOD.address);
         let is_delayed = !frames.is_empty() && period != 0;
         if is_delayed {
@@ -140,8 +140,11 @@ impl Hub {
 
     /// The arm holds: restores the speeds, until none is that of the brake.
     fn finish_hold(&mut self, now: Instant, mut hold: ArmHold, address: u8, values: &[u8]) {
-        if let Some(speeds) = self.speeds_to_restore(address, values).filter(|_| !hold.is_over()) {
-            self.line.send_write(now, Map::V22, SPEED.address, &speeds);
+        let frames = self.speeds_to_restore(address, values);
+        if !frames.is_empty() && !hold.is_over() {
+            for (address, speeds) in &frames {
+                self.line.send_write(now, Map::V22, *address, speeds);
+            }
             hold.verify();
             self.hold = Some(hold);
             return;
@@ -155,12 +158,12 @@ impl Hub {
         });
     }
 
-    /// The speeds to write; `None` if no joint has the speed of the brake.
-    fn speeds_to_restore(&self, address: u8, values: &[u8]) -> Option<Vec<u8>> {
-        let start = usize::from(SPEED.address.checked_sub(address)?);
-        let found = values.get(start..start + BRAKE.len())?;
-        let wanted = restored(found, self.known.speeds());
-        (wanted != found).then_some(wanted)
+    /// The speeds of joints that have that of the brake. The others are not written: a client may have written them since.
+    fn speeds_to_restore(&self, address: u8, values: &[u8]) -> Vec<Frame> {
+        let found = (address..=u8::MAX).zip(values).filter(|(register, _)| SPEED.holds(*register));
+        let is_slow =
+            found.filter(|&(register, speed)| *speed == BRAKE && self.known.byte(register) != BRAKE);
+        joined(is_slow.map(|(register, _)| (register, vec![self.known.byte(register)])))
     }
 
     /// Replaces the speeds of the brake in a reply to a client: a client that remembers them would restore them later.
@@ -195,6 +198,6 @@ impl Hub {
 /// The speeds without the brake. A joint that was found with another speed did not get the brake, got a speed of a client since, or
 /// belongs to an arm that restarted.
 fn restored(found: &[u8], before: &[u8]) -> Vec<u8> {
-    let rows = found.iter().zip(BRAKE).zip(before);
-    rows.map(|((&found, brake), &before)| if found == brake { before } else { found }).collect()
+    let rows = found.iter().zip(before);
+    rows.map(|(&found, &before)| if found == BRAKE { before } else { found }).collect()
 }

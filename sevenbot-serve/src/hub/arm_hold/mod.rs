@@ -217,19 +217,8 @@ impl ArmHold {
         }
         let present = present.map(Option::unwrap_or_default);
         keep_limits(limits_in(address, values), &present, &mut wanted);
-        let mut frames: Vec<Frame> = Vec::new();
-        for (joint, wanted) in Joint::ALL.into_iter().zip(wanted) {
-            let Some(bytes) = wanted.map(|wanted| self.bytes(wanted)) else { continue };
-            match frames.last_mut() {
-                Some((first, values))
-                    if usize::from(*first) + values.len() == usize::from(targets.of(joint)) =>
-                {
-                    values.extend(bytes);
-                }
-                _ => frames.push((targets.of(joint), bytes)),
-            }
-        }
-        frames
+        let wanted = Joint::ALL.into_iter().zip(wanted);
+        joined(wanted.filter_map(|(joint, wanted)| Some((targets.of(joint), self.bytes(wanted?)))))
     }
 
     /// The target of a joint that was held before: as it was read, or one that a client wrote meanwhile.
@@ -245,6 +234,20 @@ impl ArmHold {
             false => u8::try_from(value / DEGREE).into_iter().collect(),
         }
     }
+}
+
+/// One frame for writes of which each begins where the one before ends.
+pub(crate) fn joined(writes: impl Iterator<Item = Frame>) -> Vec<Frame> {
+    let mut frames: Vec<Frame> = Vec::new();
+    for (address, bytes) in writes {
+        match frames.last_mut() {
+            Some((first, values)) if usize::from(*first) + values.len() == usize::from(address) => {
+                values.extend(bytes);
+            }
+            _ => frames.push((address, bytes)),
+        }
+    }
+    frames
 }
 
 #[cfg(test)]
