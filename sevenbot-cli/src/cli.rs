@@ -268,7 +268,7 @@ mod tests {
             ("play a.txt --approach -1", "a number from 0.1 to 60"),
             ("monitor --hz -3", "-3 is not in 1..=50"),
             ("--timeout -1 info", "-1 is not in 1..=65535"),
-            ("info --baud -9600", "-9600 is not in 1..=4294967295"),
+            ("info --baud -9600", "-9600 is not in 1200..=4000000"),
         ] {
             let message = parsed(arguments).expect_err(arguments);
             assert!(message.contains(says), "{arguments}: {message}");
