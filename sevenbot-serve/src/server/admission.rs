@@ -233,6 +233,17 @@ mod tests {
         });
     }
 
+    /// The wrong tokens that may have been checked this long after the first one: the next ones 0.1, 0.3 and 0.7 s after it.
+    fn most_checks(elapsed: Duration) -> u32 {
+        let (mut count, mut wait, mut next) = (1, FIRST_WAIT, FIRST_WAIT);
+        while next <= elapsed {
+            wait = wait.saturating_mul(2).min(LONGEST_WAIT);
+            next += wait;
+            count += 1;
+        }
+        count
+    }
+
     /// All of them connect at once.
     #[test]
     fn wrong_tokens_of_one_address_are_checked_one_after_the_other() {
@@ -251,10 +262,13 @@ mod tests {
                 })
                 .collect();
             tokio::time::sleep(Duration::from_millis(650)).await;
-            // After 0.1, 0.3, and 0.7 s.
-            assert!(lock(&admission.wrong).get(&address).unwrap().count <= 3, "{:?}", start.elapsed());
             let refused = guesses.iter().filter(|guess| guess.is_finished()).count();
-            assert!((184..=187).contains(&refused), "{refused}: the others wait");
+            let checked = lock(&admission.wrong).get(&address).unwrap().count;
+            // 3, before 0.7 s: a busy machine may be here later.
+            let most = most_checks(start.elapsed());
+            assert!(checked <= most, "{checked} in {:?}", start.elapsed());
+            let most = usize::try_from(most).unwrap();
+            assert!((184..=184 + most).contains(&refused), "{refused}: the others wait");
             assert_eq!(admission.wait(Some("10.0.0.2".parse().unwrap())).await, Ok(()), "another address");
             guesses.iter().for_each(tokio::task::JoinHandle::abort);
             while lock(&admission.wrong).get(&address).unwrap().waiting > 0 {
