@@ -100,7 +100,7 @@ impl Arm {
             // After the joints: a restart, too, gives the arm other targets.
             check.check(self)?;
             if joints.targets() != begun.targets() {
-                if self.now() >= longest || !is_where_it_is(&begun, &joints) {
+                if self.now() >= longest || !are_own_targets(&begun, &joints) {
                     return Err(MoveError::OtherTargets);
                 }
                 (begun, end) = (joints.clone(), self.now() + WATCH_TIME);
@@ -127,9 +127,9 @@ impl Arm {
 }
 
 /// Are the targets that changed where their joints are?
-fn is_where_it_is(before: &JointSnapshot, now: &JointSnapshot) -> bool {
-    let changed = Joint::ALL.into_iter().filter(|joint| now.target(*joint) != before.target(*joint));
-    changed.into_iter().all(|joint| now.present(joint).abs_diff(now.target(joint)) <= OWN_TARGET_DEGREES)
+fn are_own_targets(before: &JointSnapshot, now: &JointSnapshot) -> bool {
+    let mut changed = Joint::ALL.into_iter().filter(|joint| now.target(*joint) != before.target(*joint));
+    changed.all(|joint| now.present(joint).abs_diff(now.target(joint)) <= OWN_TARGET_DEGREES)
 }
 
 /// Fails if something drags joints away from their targets.

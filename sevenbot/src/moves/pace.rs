@@ -64,8 +64,8 @@ impl PaceBefore {
         Ok(Self { registers, joints: joints_of(targets) })
     }
 
-    /// The joints of the move whose set-point still moves, as [`Joint::bit`](crate::Joint::bit)s. None from firmware that does not tell it, and no
-    /// joint that is blocked or silent.
+    /// The joints of the move whose set-point still moves, as [`Joint::bit`](crate::Joint::bit)s. None from firmware that does
+    /// not tell it, and no joint that is blocked or silent.
     ///
     /// # Errors
     /// As [`Arm::read`].
