@@ -41,6 +41,15 @@ def along_path(states: list[JointState]) -> str:
     return f"95 of 100 states within {usual:.2f} degrees of the path, all within {worst:.2f}"
 
 
+def arm_action(client: Clients) -> tuple[Client, ActionClient]:
+    """A connected client, and its access to the action of the arm."""
+    leading = client(simulated_time=True)
+    leading.connect()
+    server = ActionClient(leading.node, Fibonacci, "arm_controller/follow_joint_trajectory")
+    leading.until(server.server_is_ready, "the action")
+    return leading, server
+
+
 def goal(client: Client, server: ActionClient, order: int, feedback: list[Any]) -> Any:
     """The handle of an accepted goal."""
     sent = server.send_goal_async(
@@ -59,10 +68,7 @@ def result(client: Client, handle: Any) -> tuple[int, int]:
 
 def test_an_action_of_500_points(start: Start, client: Clients, report: Report) -> None:
     node = start.node(module="stand_in", rate=100, real_time_factor=2)
-    leading = client(simulated_time=True)
-    leading.connect()
-    server = ActionClient(leading.node, Fibonacci, "arm_controller/follow_joint_trajectory")
-    leading.until(server.server_is_ready, "the action")
+    leading, server = arm_action(client)
     for order, code in ((2, -2), (3, -1)):
         assert result(leading, goal(leading, server, order, [])) == (6, code)
     assert result(leading, goal(leading, server, 4, [])) == (4, 0), node.text()
@@ -89,10 +95,7 @@ def test_an_action_of_500_points(start: Start, client: Clients, report: Report) 
 
 def test_a_stop_is_served_while_goals_wait_for_their_start(start: Start, client: Clients) -> None:
     node = start.node(module="stand_in")
-    leading = client(simulated_time=True)
-    leading.connect()
-    server = ActionClient(leading.node, Fibonacci, "arm_controller/follow_joint_trajectory")
-    leading.until(server.server_is_ready, "the action")
+    leading, server = arm_action(client)
     begin = leading.seconds()
     waiting = [goal(leading, server, 7, []) for _ in range(4)]
     assert all(handle.accepted for handle in waiting)
@@ -111,10 +114,7 @@ def test_a_stop_is_served_while_goals_wait_for_their_start(start: Start, client:
 
 def test_a_goal_begins_where_the_arm_stands_at_its_start(start: Start, client: Clients) -> None:
     node = start.node(module="stand_in")
-    leading = client(simulated_time=True)
-    leading.connect()
-    server = ActionClient(leading.node, Fibonacci, "arm_controller/follow_joint_trajectory")
-    leading.until(server.server_is_ready, "the action")
+    leading, server = arm_action(client)
     assert leading.call("home")[0]
     assert result(leading, goal(leading, server, 4, [])) == (4, 0), node.text()
     leading.states.clear()

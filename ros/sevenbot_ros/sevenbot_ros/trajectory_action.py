@@ -32,8 +32,9 @@ from sevenbot_ros.trajectory import RawPoint, plan
 GOAL_TOLERANCE = 3.0
 GOAL_TIME = 2.0
 FEEDBACK_PERIOD = 0.1
-# Goals at a time: each controller's, and those that replace them or wait for their start. A goal may wait this long, in seconds.
+# Goals at a time: each controller's, and those that replace them or wait for their start.
 TRAJECTORIES = 4
+# The longest wait of a goal for its start, in seconds.
 LONGEST_WAIT = 30.0
 # The parameters with the names of the controllers, and the joints that each of them takes.
 CONTROLLERS = (("controller_name", NAMES), ("claw_controller_name", NAMES[6:]))
