@@ -39,11 +39,14 @@ impl Mishap {
         match self {
             Self::Trip(Trip::Overload) => "overload forced on joint 3".to_owned(),
             Self::Trip(Trip::Heat) => "heat forced on joint 3".to_owned(),
-            Self::EmergencyStop(millis) => {
-                format!("supply off for {}.{} s", millis / 1_000, millis / 100 % 10)
-            }
+            Self::EmergencyStop(millis) => format!("supply off for {}", seconds(millis)),
         }
     }
+}
+
+/// Seconds with one decimal.
+pub(super) fn seconds(millis: u64) -> String {
+    format!("{}.{} s", millis / 1_000, millis / 100 % 10)
 }
 
 /// Joint 3 is let go, or all joints are, with a payload, while joint 1 streams.

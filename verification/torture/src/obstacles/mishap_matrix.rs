@@ -7,7 +7,7 @@ use protocol_core::registers::Joint;
 use protocol_core::time::Duration;
 
 use super::arm::{ObstacleArm, degrees};
-use super::mishap::Mishap;
+use super::mishap::{Mishap, seconds};
 use super::wall::WallCase;
 
 /// The joint is driven for this time. The program sends nothing after that, so what moves then was wound up.
@@ -86,8 +86,8 @@ pub(super) fn tables<A: ObstacleArm>(cases: &[WallCase]) -> Result<String, A::Er
         {
             let cases = cases.iter().filter(|case| case.payload_g() == grams && case.is_of_its_pose());
             let worst = worst::<A>(cases, Mishap::EmergencyStop(millis), is_protected)?;
-            let seconds = format!("{}.{} s", millis / 1_000, millis / 100 % 10);
-            text += &format!("| {seconds} | {grams} g | {} | {} |\n", on(is_protected), worst.cells());
+            let (time, protection) = (seconds(millis), on(is_protected));
+            text += &format!("| {time} | {grams} g | {protection} | {} |\n", worst.cells());
         }
     }
     Ok(text)
