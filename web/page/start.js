@@ -1,5 +1,41 @@
 import init, * as sevenbot from "./sevenbot_web.js";
 
-await init({ module_or_path: new URL("sevenbot_web_bg.wasm", import.meta.url) });
+// What the first view does not need.
+const REST = new URL("rest.wasm", import.meta.url);
+
+const first = await init({ module_or_path: new URL("sevenbot_web_bg.wasm", import.meta.url) });
+let isRestThere = false;
+
+function enter(module) {
+  if (!isRestThere) new WebAssembly.Instance(module, { first });
+  isRestThere = true;
+}
+
+// The module calls this before it uses its rest, and cannot wait: a request that blocks, without the types of others.
+window.loadRest = () => {
+  if (isRestThere) return;
+  const request = new XMLHttpRequest();
+  request.open("GET", REST, false);
+  request.overrideMimeType("text/plain; charset=x-user-defined");
+  request.send();
+  enter(new WebAssembly.Module(Uint8Array.from(request.responseText, (letter) => letter.charCodeAt(0))));
+};
+
+async function loadRestInTime() {
+  try {
+    const response = await fetch(REST);
+    enter(await WebAssembly.compile(await response.arrayBuffer()));
+  } catch {
+    setTimeout(loadRestInTime, 1000);
+  }
+}
+
+function afterFirstPicture() {
+  if (sevenbot.frame_count() > 1) loadRestInTime();
+  else requestAnimationFrame(afterFirstPicture);
+}
+
+sevenbot.start();
 // For tests and the console of the browser: state(), project(x, y, z), frame_count().
 window.sevenbot = sevenbot;
+afterFirstPicture();

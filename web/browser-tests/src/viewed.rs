@@ -59,7 +59,13 @@ impl Viewed {
     /// Opens the page, ends its tour, and waits until an arm answers.
     #[must_use]
     pub fn open(&self) -> Page {
-        let mut page = Page::open(&self.url);
+        self.open_after("")
+    }
+
+    /// As [`Self::open`]. `script` runs before the scripts of the page.
+    #[must_use]
+    pub fn open_after(&self, script: &str) -> Page {
+        let mut page = Page::open_after(&self.url, script);
         page.key("Escape");
         page.wait_until_ready();
         page

@@ -7,14 +7,16 @@ use wasm_bindgen::{JsCast, JsValue};
 use web_sys::{Element, Event, HtmlDialogElement, HtmlInputElement, KeyboardEvent};
 
 use super::dom::{Dom, number};
+use super::editor::Editor;
 use super::files;
 use super::hand;
+use super::link;
 use super::page::{App, Line, on, on_first};
 use super::panels::TIP_FIELDS;
-use super::programs;
 use super::storage;
 use crate::arm_state::target_frame;
 use crate::plots::Quantity;
+use crate::texts::Language;
 
 /// The texts of the tour, in their order. The last one is for a real arm.
 pub(super) const TOUR: [&str; 5] = ["tour-1", "tour-2", "tour-3", "tour-4", "tour-5"];
@@ -32,11 +34,24 @@ pub(super) fn listen(dom: &Dom) -> Result<(), JsValue> {
             event.prevent_default();
         }
     })?;
-    programs::listen(dom)?;
+    link::listen()?;
     hand::listen(dom)
 }
 
 impl App {
+    /// Shows the page in this language.
+    pub(super) fn set_language(&mut self, language: Language) {
+        self.language = language;
+        self.dom.translate(language);
+        self.show_tour();
+        if Editor.is_loaded() {
+            self.translate_editor();
+        }
+        if self.exercises.is_open {
+            self.show_exercise();
+        }
+    }
+
     fn clicked(&mut self, event: &Event) {
         let target = event.target().and_then(|target| target.dyn_into::<Element>().ok());
         let Some(button) = target.and_then(|target| target.closest("[data-action]").ok()?) else { return };
@@ -100,7 +115,7 @@ impl App {
         // A target would be one point of the stream of a movement, and the next point would lead back.
         let moves = [MOTOR_STATE, TARGET_POSITION, FINE_TARGET].iter().any(|row| row.holds(address));
         if moves {
-            self.show_time_line(None);
+            self.hide_time_line();
             self.end_movement();
         }
         self.client.write(now, address, values);

@@ -1,21 +1,16 @@
 //! What the page has of exercises.
 
-use exercises::{Attempt, Exercise, shipped};
+use exercises::{Attempt, Exercise};
 
 /// The exercises, the chosen one, and the attempt at it.
+#[derive(Default)]
 pub(super) struct Exercises {
     pub(super) is_open: bool,
-    /// Those that ship, and those that were opened from files.
+    /// Those that ship, and those that were opened from files. Empty until they are first shown.
     pub(super) all: Vec<Exercise>,
     pub(super) chosen: usize,
     pub(super) attempt: Option<Attempt>,
     pub(super) shown_hints: usize,
-}
-
-impl Default for Exercises {
-    fn default() -> Self {
-        Self { is_open: false, all: shipped(), chosen: 0, attempt: None, shown_hints: 0 }
-    }
 }
 
 impl Exercises {

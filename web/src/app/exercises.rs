@@ -1,7 +1,7 @@
 //! Exercises: chosen, begun, watched while the arm moves, and their results saved.
 
 use arm_sim::Action;
-use exercises::{Attempt, Exercise, SolutionPart};
+use exercises::{Attempt, Exercise, SolutionPart, shipped};
 use js_sys::Date;
 use protocol_core::time::Instant;
 use wasm_bindgen::JsValue;
@@ -32,6 +32,9 @@ impl App {
     fn toggle_exercises(&mut self) {
         self.exercises.is_open = !self.exercises.is_open;
         let is_open = self.exercises.is_open;
+        if self.exercises.all.is_empty() {
+            self.exercises.all = shipped();
+        }
         self.dom.set_hidden("exercise", !is_open);
         for button in self.dom.all("[data-action=exercises]") {
             set_attribute(&button, "aria-pressed", if is_open { "true" } else { "false" });

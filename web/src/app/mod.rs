@@ -29,6 +29,7 @@ mod exports;
 mod files;
 mod hand;
 mod kept_recording;
+mod link;
 mod movements;
 mod page;
 mod panels;
@@ -36,6 +37,7 @@ mod picture;
 mod program_state;
 mod programs;
 mod recording;
+mod rest;
 mod storage;
 mod time_line;
 mod time_line_state;
@@ -53,7 +55,7 @@ use page::{App, with_app};
 ///
 /// # Errors
 /// The page lacks an element.
-#[wasm_bindgen(start)]
+#[wasm_bindgen]
 pub fn start() -> Result<(), JsValue> {
     let dom = Dom::of_window()?;
     panels::build(&dom)?;

@@ -52,7 +52,7 @@ impl App {
         if self.is_stopping() {
             return;
         }
-        self.show_time_line(None);
+        self.hide_time_line();
         let before = self.registers_before_movement();
         self.park = Some(Park::new(before, self.now()));
         self.dom.notice(self.language.text("parking"));

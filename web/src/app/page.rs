@@ -283,7 +283,9 @@ impl App {
     fn new_state(&mut self, now: Instant) {
         let state = self.client.state();
         let vacuum = self.client.registers().byte(&VACUUM_PUMP) != 0;
-        self.observe_exercise(now);
+        if self.exercises.attempt.is_some() {
+            self.observe_exercise(now);
+        }
         let registers = self.client.registers();
         if let Some(recorder) = &mut self.recorder
             && let Err(fault) = recorder.add(now, registers, vacuum)
@@ -296,14 +298,6 @@ impl App {
         self.history.push(Sample { time, angles, loads, velocities });
     }
 
-    pub(super) fn set_language(&mut self, language: Language) {
-        self.language = language;
-        self.dom.translate(language);
-        self.show_tour();
-        self.translate_editor();
-        self.show_exercise();
-    }
-
     /// Changes to another arm: everything that belonged to the last one ends.
     pub(super) fn set_line(&mut self, line: Line) {
         drop(self.swap_line((line, Client::default())));
@@ -311,19 +305,28 @@ impl App {
 
     /// As [`Self::set_line`], with what is known of the arm. Returns the last one.
     pub(super) fn swap_line(&mut self, line: (Line, Client)) -> (Line, Client) {
-        self.end_recording();
+        if self.recorder.is_some() {
+            self.end_recording();
+        }
         self.leave_arm();
         let before = (std::mem::replace(&mut self.line, line.0), std::mem::replace(&mut self.client, line.1));
         (self.shown_round, self.slid_round) = (0, 0);
         (self.hand, self.unreachable) = (None, None);
         self.is_end_told = false;
         self.exercises.end();
-        self.show_time_line(None);
+        self.hide_time_line();
         self.history = History::new(PLOT_SECONDS);
         let is_simulated = matches!(self.line, Line::Simulated(_));
         self.dom.set_hidden("simulator", !is_simulated);
         self.dom.end_notice();
         before
+    }
+
+    /// Shows no time line.
+    pub(super) fn hide_time_line(&mut self) {
+        if self.time_lines.shown.is_some() || self.time_lines.preview.is_some() {
+            self.show_time_line(None);
+        }
     }
 
     pub(super) fn send(&mut self, bytes: &[u8]) {

@@ -3,34 +3,17 @@
 use block_programs::{Program, ProgramError, python};
 use protocol_core::time::Instant;
 use sevenbot::Snapshot;
-use wasm_bindgen::prelude::Closure;
-use wasm_bindgen::{JsCast, JsValue};
-use wasm_bindgen_futures::{JsFuture, spawn_local};
-use web_sys::{Element, Event, HtmlInputElement};
 
-use super::dom::{Dom, set_attribute};
+use super::dom::set_attribute;
 use super::editor::Editor;
 use super::files;
-use super::page::{App, with_app};
+use super::page::App;
 use super::storage;
 use crate::program::{Pace, ProgramProgress, ProgramRun};
 use crate::words;
 
 /// The name of the program in the browser's storage.
 const KEPT: &str = "program";
-/// How the part of an address begins that holds a program.
-const FRAGMENT: &str = "#program=";
-
-/// Shows the program of the address, if it has one, now and when the address changes.
-pub(super) fn listen(dom: &Dom) -> Result<(), JsValue> {
-    let window = web_sys::window().ok_or("no window")?;
-    let changed = Closure::<dyn FnMut(Event)>::new(|_| {
-        with_app(App::open_link);
-    });
-    window.add_event_listener_with_callback("hashchange", changed.as_ref().unchecked_ref())?;
-    changed.forget();
-    dom.get::<Element>("program").map(drop)
-}
 
 impl App {
     /// Does what a button asks for. Returns whether it is one of programs.
@@ -57,7 +40,7 @@ impl App {
         true
     }
 
-    fn toggle_programs(&mut self) {
+    pub(super) fn toggle_programs(&mut self) {
         self.programs.is_open = !self.programs.is_open;
         let is_open = self.programs.is_open;
         self.dom.set_hidden("program", !is_open);
@@ -104,9 +87,7 @@ impl App {
 
     /// The editor in another language.
     pub(super) fn translate_editor(&mut self) {
-        if Editor.is_loaded()
-            && let Some(element) = self.dom.element("blocks")
-        {
+        if let Some(element) = self.dom.element("blocks") {
             Editor.open(&element, self.language.tag(), Self::program_changed);
             self.programs.lit.clear();
             self.program_changed();
@@ -234,56 +215,6 @@ impl App {
         } else {
             self.dom.notice(&format!("{} {why}", self.language.text("no-program")));
         }
-    }
-
-    /// Makes an address with the program in it.
-    fn share(&mut self) {
-        let Some(letters) = Editor.pack(&self.programs.text) else { return };
-        spawn_local(async move {
-            let letters = JsFuture::from(letters).await.ok().and_then(|letters| letters.as_string());
-            with_app(|app| app.show_link(&letters.unwrap_or_default()));
-        });
-    }
-
-    fn show_link(&self, letters: &str) {
-        let Some(location) = web_sys::window().map(|window| window.location()) else { return };
-        // Without the rest of the address: it has the token of a server.
-        let page = location.origin().unwrap_or_default() + &location.pathname().unwrap_or_default();
-        let link = format!("{page}{FRAGMENT}{letters}");
-        if let Ok(field) = self.dom.get::<HtmlInputElement>("program-link") {
-            field.set_value(&link);
-            self.dom.set_hidden("link-row", false);
-            field.select();
-        }
-        Editor.copy(&link);
-    }
-
-    /// Opens the program of the address, if it has one.
-    pub(super) fn open_link(&mut self) {
-        let Some(window) = web_sys::window() else { return };
-        let fragment = window.location().hash().unwrap_or_default();
-        let Some(letters) = fragment.strip_prefix(FRAGMENT) else { return };
-        if !Editor.is_loaded() {
-            // The editor comes back here when it is loaded.
-            if !self.programs.is_open {
-                self.toggle_programs();
-            }
-            return;
-        }
-        // A reload shows the program as it was edited since.
-        let address = window.location().pathname().unwrap_or_default()
-            + &window.location().search().unwrap_or_default();
-        if let Ok(history) = window.history() {
-            let _ = history.replace_state_with_url(&JsValue::NULL, "", Some(&address));
-        }
-        let Some(text) = Editor.unpack(letters) else { return };
-        spawn_local(async move {
-            let text = JsFuture::from(text).await.ok().and_then(|text| text.as_string());
-            with_app(|app| match text.filter(|text| !text.is_empty()) {
-                Some(text) => app.open_program(text),
-                None => app.dom.notice(app.language.text("bad-link")),
-            });
-        });
     }
 }
 

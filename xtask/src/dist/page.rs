@@ -83,13 +83,15 @@ fn editor() -> TaskResult<String> {
 /// The program of the page, with its module as text.
 fn script() -> TaskResult<String> {
     let folder: PathBuf = build_directory().join("page");
-    web::bindgen(Bindgen::new().input_path(web::module(&build_directory())).no_modules(true)?, &folder)?;
+    let mut bindgen = Bindgen::new();
+    bindgen.input_path(web::module(&build_directory())).no_modules(true)?.remove_name_section(true);
+    web::bindgen(&mut bindgen, &folder)?;
     let code = fs::read_to_string(folder.join("sevenbot_web.js"))?;
     let module = BASE64_STANDARD.encode(fs::read(folder.join("sevenbot_web_bg.wasm"))?);
     // The body has to be there, as a script of the type `module` waits for it.
     Ok(format!(
         "<script>\n{code}\naddEventListener(\"DOMContentLoaded\", async () => {{\n  \
          const module = Uint8Array.from(atob(\"{module}\"), (letter) => letter.charCodeAt(0));\n  \
-         await wasm_bindgen({{ module_or_path: module }});\n  window.sevenbot = wasm_bindgen;\n}});\n</script>"
+         await wasm_bindgen({{ module_or_path: module }});\n  wasm_bindgen.start();\n  window.sevenbot = wasm_bindgen;\n}});\n</script>"
     ))
 }

@@ -10,6 +10,7 @@ mod figures;
 mod firefox;
 mod moving;
 mod page;
+mod parts;
 mod pictures;
 mod pixels;
 mod programs;

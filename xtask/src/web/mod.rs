@@ -2,12 +2,15 @@
 //!
 //! ```text
 //!   web/src  ── cargo ──▶ sevenbot_web.wasm ── wasm-bindgen ──▶ web/dist/sevenbot_web.js, sevenbot_web_bg.wasm
+//!                                                                  └── split ──▶ web/dist/rest.wasm
 //!   web/page ─────────────────────── copy ──▶ web/dist
 //!   Blockly, web/block-editor ──────────────▶ web/dist/programs.js, which the page loads when programs are opened
 //! ```
 //!
 //! wasm-bindgen is a library here, at exactly the version of the crate that the page is linked with. So no other program has
 //! to be installed.
+
+mod split;
 
 use std::fs;
 use std::io::Write;
@@ -30,6 +33,8 @@ const PROFILE: &str = "web";
 pub(crate) const EDITOR: &str = "programs.js";
 /// How the names of the teacher's screen begin. It is a view of its own.
 const TEACHER: &str = "teacher.";
+/// The part of the module that the page loads after its first picture.
+const REST: &str = "rest.wasm";
 
 /// Builds the page, prints its size and compares it with its budget.
 pub(crate) fn build() -> TaskResult {
@@ -41,13 +46,22 @@ pub(crate) fn build() -> TaskResult {
     }
     copy_folder(&root().join("web/page"), &dist)?;
     bindgen(Bindgen::new().input_path(module(&target_directory())).web(true)?, &dist)?;
+    split_module(&dist)?;
     fs::write(dist.join(EDITOR), blockly::script()?)?;
     let sizes = print_sizes(&dist)?;
     let all = sizes.iter().map(|(_, size)| size).sum();
-    let is_first = |name: &str| name != EDITOR && !name.starts_with(TEACHER);
+    let is_first = |name: &str| name != EDITOR && name != REST && !name.starts_with(TEACHER);
     let first = sizes.iter().filter(|(name, _)| is_first(name)).map(|(_, size)| size).sum();
     let figures = [("page: first view with gzip, bytes", first), ("page: all files with gzip, bytes", all)];
     budget::check("web", &figures.map(|(name, size)| Figure::new(name, size)), false)
+}
+
+/// Leaves what the first view needs in the module of the page, and puts the rest beside it.
+fn split_module(dist: &Path) -> TaskResult {
+    let module = dist.join("sevenbot_web_bg.wasm");
+    let parts = split::split(&fs::read(&module)?)?;
+    fs::write(module, parts.first)?;
+    Ok(fs::write(dist.join(REST), parts.rest)?)
 }
 
 /// The page's module in a target directory of cargo.
@@ -55,9 +69,10 @@ pub(crate) fn module(target_directory: &Path) -> PathBuf {
     target_directory.join(BROWSER).join(PROFILE).join("sevenbot_web.wasm")
 }
 
-/// Writes the module of the page for browsers, and the script that loads it.
+/// Writes the module of the page for browsers, and the script that loads it. The functions keep their names, by which
+/// [`split`] chooses.
 pub(crate) fn bindgen(bindgen: &mut Bindgen, folder: &Path) -> TaskResult {
-    let bindgen = bindgen.remove_name_section(true).remove_producers_section(true).typescript(false);
+    let bindgen = bindgen.remove_producers_section(true).typescript(false);
     Ok(bindgen.generate(folder).map_err(|why| format!("wasm-bindgen: {why:#}"))?)
 }
 

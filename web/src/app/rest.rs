@@ -1,0 +1,25 @@
+//! The rest of the module, which the page loads after its first picture (`cargo xtask web` splits the module).
+
+use core::cell::Cell;
+
+use wasm_bindgen::prelude::wasm_bindgen;
+
+thread_local! {
+    static IS_LOADED: Cell<bool> = const { Cell::new(false) };
+}
+
+#[wasm_bindgen]
+extern "C" {
+    /// Loads the rest unless it is there. Of `start.js`.
+    #[wasm_bindgen(js_name = loadRest)]
+    fn load_rest();
+}
+
+/// Returns when the rest is there. The first part calls this before each function of the rest.
+#[wasm_bindgen]
+pub fn need_rest() {
+    if !IS_LOADED.get() {
+        load_rest();
+        IS_LOADED.set(true);
+    }
+}
