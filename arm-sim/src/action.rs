@@ -13,6 +13,7 @@ use crate::servo::Trip;
 
 /// Something that is done to an arm. Times are in microseconds in its words, and positions in counts.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Action {
     /// `disconnect`: the last client closes the port.
     Disconnect,

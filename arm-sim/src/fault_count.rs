@@ -2,6 +2,7 @@
 
 /// How often a fault took effect, and how often it could have.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FaultCount {
     /// How often it took effect.
     pub effects: u64,

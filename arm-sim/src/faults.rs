@@ -31,6 +31,7 @@ pub use obstacle::{Obstacle, UnknownObstacle};
 
 /// A fault of the simulated arm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum ArmFault {
     /// Of this joint's servo.
     Servo(Joint, ServoFault),
@@ -52,6 +53,7 @@ pub enum ArmFault {
 
 /// Where a fault is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum FaultLocation {
     /// The servo of a joint.
     Joint(Joint),
@@ -245,6 +247,7 @@ impl ArmFault {
 
 /// A fault, and how often it took effect so far.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FaultReport {
     /// The fault.
     pub fault: ArmFault,

@@ -9,6 +9,7 @@ use crate::fault_count::FaultCount;
 
 /// A fault of the settings storage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum FlashFault {
     /// The flash refuses every write and erase.
     Fails,
@@ -62,6 +63,7 @@ impl<E: NorFlashError> NorFlashError for FlashError<E> {
 
 /// A flash, with a fault or without.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct FaultyFlash<F> {
     pub(crate) flash: F,
     fails: bool,

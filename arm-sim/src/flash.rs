@@ -37,6 +37,7 @@ pub trait Cells: Debug {
 
 /// Cells in memory. A copy has cells of its own.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Memory {
     /// The cells behind the last one here are erased.
     bytes: Vec<u8>,
@@ -82,6 +83,7 @@ impl Cells for Memory {
 
 /// The two sectors.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Flash<C = Memory>(C);
 
 impl Flash {

@@ -24,6 +24,7 @@ const LONGEST_DELAY_MS: u64 = 10_000;
 
 /// A fault of the host line, in both directions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum LineFault {
     /// This share of the bytes is lost, in millionths.
     Loss(u32),
@@ -88,6 +89,7 @@ impl Display for LineFault {
 
 /// A fault that hits a random share of the bytes.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct RandomFault {
     millionths: u32,
     random: SplitMix64,
@@ -118,6 +120,7 @@ impl RandomFault {
 
 /// One direction of the host line.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct LineDirection {
     pacer: Pacer,
     loss: RandomFault,

@@ -50,6 +50,8 @@ pub mod session;
 mod settings_log;
 pub mod simulated_arm;
 pub mod simulation;
+#[cfg(feature = "serde")]
+pub mod snapshot_bytes;
 pub mod stock_controller;
 pub mod tap;
 mod thousandths;

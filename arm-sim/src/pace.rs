@@ -22,6 +22,7 @@ const BATCH_MICROS: u64 = 1_000;
 
 /// One direction of a serial line.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Pacer {
     /// In bits per second. `None`: bytes arrive at once.
     baud: Option<u64>,

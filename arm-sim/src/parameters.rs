@@ -44,6 +44,7 @@ use protocol_core::time::Duration;
 /// The parameters of a make of servo. Torques are in micronewton metres, drags in micronewton metre seconds per radian,
 /// inertias in gram square millimetres.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ServoParameters {
     /// The torque at full duty and standstill.
     pub stall_torque: i64,

@@ -51,6 +51,7 @@ const LONGEST_CATCH_UP: Duration = Duration::from_millis(100_000);
 
 /// Seven servos on one wire.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Plant {
     config: ServoConfig,
     servos: [Servo; JOINTS],

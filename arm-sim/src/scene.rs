@@ -33,6 +33,7 @@ const WEIGHTS: [f64; 2] = [1.0, 1_000.0];
 
 /// What the arm ends in.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Tool {
     /// Two fingers, moved by joint 7.
     #[default]
@@ -43,6 +44,7 @@ pub enum Tool {
 
 /// A form and its size in mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Form {
     /// With equal edges.
     Cube {
@@ -60,6 +62,7 @@ pub enum Form {
 
 /// Something that can be gripped, pushed and dropped.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Item {
     /// Its name.
     pub name: String,
@@ -75,6 +78,7 @@ pub struct Item {
 
 /// A block that never moves. It stands on the table.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Block {
     /// Its name.
     pub name: String,
@@ -95,6 +99,7 @@ pub struct Block {
 /// # Ok::<(), arm_sim::scene::SceneError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Scene {
     /// The height of the table: z in mm.
     pub table: f64,

@@ -50,6 +50,7 @@ pub struct ServoAnswer {
 
 /// A servo.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Servo {
     config: ServoConfig,
     registers: ServoRegisters,
@@ -77,6 +78,7 @@ pub struct Servo {
 
 /// What a servo reports apart from the measurements of its motor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Reported {
     decivolts: u8,
     celsius: u8,

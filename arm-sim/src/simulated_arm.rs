@@ -45,6 +45,7 @@ const SERVO_TIMEOUT: Duration = Duration::from_millis(5);
 const GUARD_TIME: Duration = Duration::from_micros(100);
 /// What differs from one simulated arm to another.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ArmConfig {
     /// The chip id, most significant byte first ([D8](protocol_core::decisions#d8)).
     pub chip_id: [u8; 6],
@@ -56,6 +57,7 @@ pub struct ArmConfig {
 
 /// An arm with a host line, with settings on the flash `F`, servos on the bus `B` and the controller `C`.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct SimulatedArm<F, B = Plant, C = Controller> {
     config: ArmConfig,
     settings: Settings<FaultyFlash<F>>,
@@ -63,7 +65,9 @@ pub struct SimulatedArm<F, B = Plant, C = Controller> {
     bus: B,
     to_arm: LineDirection,
     to_host: LineDirection,
+    #[cfg_attr(feature = "serde", serde(skip))]
     tap: Watcher<dyn Tap>,
+    #[cfg_attr(feature = "serde", serde(skip))]
     recorder: Watcher<dyn SessionRecorder>,
     now: Instant,
     /// When the controller has to be polled again.

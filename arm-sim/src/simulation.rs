@@ -76,6 +76,7 @@ impl Default for SimulationConfig {
 
 /// An arm in virtual time, with the controller `C`. The same calls give the same bytes on every machine.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Simulation<C = Controller> {
     arm: SimulatedArm<Flash, Plant, C>,
     now: Instant,

@@ -7,6 +7,7 @@ use crate::float::Float;
 
 /// A point in millimetres, or a direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Vector<F> {
     /// To the right.
     pub x: F,

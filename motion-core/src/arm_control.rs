@@ -34,6 +34,7 @@ use crate::vacuum::VacuumControl;
 
 /// Registers, joints, servo bus, status and vacuum of one arm.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct ArmControl {
     pub(crate) registers: RegisterFile,
     pub(crate) bus: BusScheduler,

@@ -29,6 +29,7 @@ const TORQUE_READ_CYCLES: u8 = 12;
 
 /// The servo bus and its schedule.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct BusScheduler {
     bus: Bus,
     /// When start-up ends at the latest; `None` once it is over.

@@ -41,6 +41,7 @@ pub enum Output<'a> {
 
 /// The controller of one arm.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Controller {
     host: HostPort,
     arm: ArmControl,

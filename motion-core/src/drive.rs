@@ -24,6 +24,7 @@ use crate::trajectory::Trajectory;
 const REJOIN_WITHIN: MicroDegrees = MicroDegrees::from_degrees(3);
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 enum Engagement {
     /// The joint is not driven.
     Released,
@@ -49,6 +50,7 @@ pub enum Target {
 
 /// The drive of one joint.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Drive {
     engagement: Engagement,
     trajectory: Trajectory,

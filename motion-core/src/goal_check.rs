@@ -19,6 +19,7 @@ const REPEATS: u8 = 3;
 
 /// What is known of the goal at one servo.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct GoalCheck {
     /// Successive answers that showed another goal, also of earlier engagements.
     misses: u8,

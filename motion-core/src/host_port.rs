@@ -22,6 +22,7 @@ use crate::reports::{ReportKind, Reports};
 
 /// A read of `count` registers from `address` on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Read {
     pub(crate) address: u8,
     pub(crate) count: u8,
@@ -53,6 +54,7 @@ pub(crate) enum HostEvent<'a> {
 
 /// The arm's end of the host link.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct HostPort {
     deframer: Deframer<ToArm>,
     /// The oldest pending request, if it is a read. The requests behind it wait in the deframer.

@@ -6,6 +6,7 @@ use protocol_core::time::{Duration, Instant};
 
 /// The watchdog of the host link.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct HostWatchdog {
     /// The longest silence, in units of 10 ms; zero is off.
     timeout: u8,

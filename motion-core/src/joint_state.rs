@@ -44,6 +44,7 @@ enum Protected {
 
 /// The state of one joint.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct JointState {
     joint: Joint,
     pub(crate) drive: Drive,

@@ -30,6 +30,7 @@ const RESTART_TIME: Duration = Duration::from_millis(180);
 
 /// The seven joints and their motor state.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Joints {
     joints: [JointState; JOINTS],
     state: MotorState,

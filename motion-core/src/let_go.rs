@@ -37,6 +37,7 @@ const ATTEMPTS: usize = 3;
 
 /// Does the servo of one joint hold it?
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct LetGo {
     state: State,
     /// When the joint engaged anew, the latest first.
@@ -48,6 +49,7 @@ pub(crate) struct LetGo {
 }
 
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 enum State {
     Holding,
     /// There is an alarm and no load. Since then the joint was no nearer to its set-point than `nearest`, and it is far from it since.

@@ -7,6 +7,7 @@ use crate::servo_bus::Torque;
 /// Register 29.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum MotorState {
     /// No joint is driven; the motors brake.
     Damping,

@@ -25,6 +25,7 @@ pub(crate) struct HeldBack {
 
 /// The obstacle of one joint.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Obstacle {
     limiter: PushLimiter,
     /// For how many control cycles the joint is held back and came no nearer than this distance to its target. The time of a

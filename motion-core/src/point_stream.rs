@@ -25,6 +25,7 @@ const LATE_DIVISOR: u64 = 8;
 
 /// A point of a stream.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Point {
     due: Instant,
     angle: MicroDegrees,
@@ -32,6 +33,7 @@ struct Point {
 
 /// The points of a stream that the joint has not passed yet.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PointStream {
     /// The oldest first.
     points: Vec<Point, CAPACITY>,

@@ -47,6 +47,7 @@ pub enum FilterOutcome {
 
 /// The position filter of one joint.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PositionFilter {
     /// The last answer, accepted or rejected.
     last: Option<(u16, Instant)>,

@@ -76,11 +76,13 @@ pub struct PushSample {
 
 /// The push limiter of one joint.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PushLimiter {
     phase: Phase,
 }
 
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 enum Phase {
     Free,
     /// The push is over the limit.
@@ -95,6 +97,7 @@ enum Phase {
 
 /// How far the set-point may go in the direction of the push.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Bound {
     is_positive: bool,
     /// The allowed distance between measured position and set-point.

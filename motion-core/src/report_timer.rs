@@ -15,6 +15,7 @@ pub const fn highest_frequency(baud: u32, registers: u8) -> u32 {
 
 /// A timer that becomes due `frequency` times a second, without drift.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ReportTimer {
     /// In Hz; 0 is off.
     frequency: u32,

@@ -17,6 +17,7 @@ use crate::report_timer::{ReportTimer, highest_frequency};
 
 /// What a report holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) enum ReportKind {
     /// The present positions of map 2.2.
     Positions,
@@ -70,6 +71,7 @@ impl ReportKind {
 
 /// The streams that run.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Reports {
     /// What the reports of `joints` hold.
     kind: ReportKind,

@@ -14,6 +14,7 @@ const ALL_JOINTS: u8 = 0x7F;
 
 /// The part of the status block that does not come from the joints.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Status {
     storage: Storage,
     /// Fault bits that stay until the next restart.

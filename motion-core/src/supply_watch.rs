@@ -16,6 +16,7 @@ const LOST_AFTER: Duration = Duration::from_millis(1_000);
 
 /// Watches the supply of the servos.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct SupplyWatch {
     all_silent_since: Option<Instant>,
     /// All driven servos were silent for long enough, and since then none answered with torque.

@@ -15,6 +15,7 @@ const CONFIRMED_BY: u8 = 2;
 
 /// What is known of a torque switch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 enum Known {
     /// It was ordered on, and not read since.
     Ordered,
@@ -37,6 +38,7 @@ pub(crate) enum TorqueFound {
 
 /// The torque switch of one servo.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct TorqueCheck {
     known: Known,
     /// Successive answers that say off.

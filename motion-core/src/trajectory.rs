@@ -19,6 +19,7 @@ const LARGEST_STEP: i32 = 3_720_000;
 
 /// The set-point of one joint and its target.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Trajectory {
     set_point: MicroDegrees,
     /// In a stream: its newest point.

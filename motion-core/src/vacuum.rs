@@ -8,6 +8,7 @@ const RELEASE_TIME: Duration = Duration::from_millis(500);
 /// The two outputs of the vacuum control.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Vacuum {
     /// The pump runs.
     pub pump: bool,
@@ -17,6 +18,7 @@ pub struct Vacuum {
 
 /// The state of the vacuum control.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct VacuumControl {
     wanted: Vacuum,
     /// The outputs that `poll` returned last.

@@ -120,6 +120,7 @@ impl<'a> Report<'a> {
 /// [M8](crate::decisions#m8)).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Alarm {
     /// 0: message. 1: warning. 2: fatal.
     pub level: u8,

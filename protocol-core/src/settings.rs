@@ -8,6 +8,7 @@ use crate::registers::Image;
 /// The state of the settings storage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Storage {
     /// The storage takes another image.
     Ready,
@@ -20,6 +21,7 @@ pub enum Storage {
 
 /// The journal, and the settings that it held at start.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Settings<F> {
     journal: Journal<F>,
     opened: Opened,

@@ -12,6 +12,7 @@ const REPORTS: usize = 16;
 
 /// A fault, and when it ends by itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct ListedFault {
     pub(crate) fault: ArmFault,
     pub(crate) until: Option<Instant>,
@@ -19,6 +20,7 @@ pub(crate) struct ListedFault {
 
 /// The faults, in the order in which they began. No two have the same place.
 #[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct FaultList(Vec<ListedFault>);
 
 impl FaultList {
@@ -75,6 +77,7 @@ impl FaultList {
 
 /// The reports of the faults that ended by themselves.
 #[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct EndedFaults(VecDeque<FaultReport>);
 
 impl EndedFaults {

@@ -13,6 +13,7 @@ use crate::thousandths::Thousandths;
 
 /// Something that a joint meets. It is counted in milliseconds: those in which the joint touched it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Obstacle {
     /// A wall: in front of the joint or behind it, depending on where the joint is when the wall is set.
     Wall(Wall),

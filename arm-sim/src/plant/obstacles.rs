@@ -22,6 +22,7 @@ const CLAW: Joint = Joint::ALL[6];
 /// A wall in the way of a joint: in front of the joint or behind it, depending on where the joint is when the wall is
 /// set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Wall {
     /// Where the joint touches it.
     pub millidegrees: i32,
@@ -32,6 +33,7 @@ pub struct Wall {
 
 /// A thing between the claws.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Thing {
     /// The angle of joint 7 at which the claws touch it.
     pub millidegrees: i32,

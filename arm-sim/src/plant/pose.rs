@@ -11,6 +11,7 @@ const SPAN: u16 = 850;
 
 /// How positions of a joint's servo become angles, and back.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct AngleScale {
     /// The angle at 0 counts, in thousandths of a degree.
     first: i64,

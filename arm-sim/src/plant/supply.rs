@@ -19,6 +19,7 @@ const DIP: Duration = Duration::from_millis(20);
 
 /// A fault of the supply of the servos. The controller has its own supply.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum SupplyFault {
     /// The voltage without load, in 0.1 V.
     Volts(u8),
@@ -71,6 +72,7 @@ impl Display for SupplyFault {
 
 /// The supply.
 #[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Supply {
     fault: Option<SupplyFault>,
     /// When the fault began.

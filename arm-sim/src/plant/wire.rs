@@ -19,6 +19,7 @@ const DAMAGE: u8 = 0x55;
 
 /// Bytes without a pause between them.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct FrameOnWire {
     /// The start of the first byte, if the wire is free by then.
     start: Instant,
@@ -29,6 +30,7 @@ struct FrameOnWire {
 
 /// The bytes to the master that have not arrived.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Wire {
     /// In bits per second.
     baud: u32,

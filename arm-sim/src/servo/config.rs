@@ -5,6 +5,7 @@ use protocol_core::time::Duration;
 
 /// The make of a servo.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ServoConfig {
     /// After power-up a servo executes no frames for this long. Real servos: about 200 ms.
     pub boot_time: Duration,

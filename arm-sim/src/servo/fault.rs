@@ -10,6 +10,7 @@ use protocol_core::time::Duration;
 /// A fault of a simulated servo. Its effects are counted in frames to the servo (missing), answers (late, garbled),
 /// milliseconds (stuck) or restarts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum ServoFault {
     /// It has no power: it executes no frame, sends no answer and drives nothing. When the fault is removed, it starts.
     Missing,

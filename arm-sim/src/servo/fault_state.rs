@@ -11,6 +11,7 @@ const DAMAGE: u8 = 0x55;
 
 /// The fault of a servo, if it has one, with its timer and the number of its effects.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct FaultState {
     fault: Option<ServoFault>,
     /// When [`ServoFault::Restarting`] restarts the servo.

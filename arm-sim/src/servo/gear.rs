@@ -33,6 +33,7 @@ impl Torques {
 
 /// The constants of a gear.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Gear(pub(super) ServoParameters);
 
 impl Gear {

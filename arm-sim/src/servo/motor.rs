@@ -33,6 +33,7 @@ const FULL_DUTY: i64 = 1_000_000;
 
 /// A motor with its gear and its position sensor.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Motor {
     gear: Gear,
     /// The distance of a step at full speed without load.
@@ -66,6 +67,7 @@ pub(crate) struct Motor {
 
 /// What acts on a motor in a step, besides its surroundings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) enum MotorMode {
     /// Something outside the servo holds it in place.
     Held,

@@ -6,6 +6,7 @@ use crate::fault_count::FaultCount;
 
 /// An alarm that is forced on a servo.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Trip {
     /// It latches an overload.
     Overload,

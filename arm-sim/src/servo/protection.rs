@@ -30,6 +30,7 @@ pub(super) struct Limits {
 
 /// The alarms of a servo.
 #[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Protection {
     /// Number of successive steps with an overload.
     overload_steps: u32,

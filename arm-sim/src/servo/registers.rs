@@ -15,7 +15,9 @@ use super::protection::Limits;
 
 /// The registers of one servo.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct ServoRegisters {
+    #[cfg_attr(feature = "serde", serde(with = "serde_bytes"))]
     registers: [u8; COUNT],
     has_new_goal: bool,
     /// A frame wrote the torque switch since the servo's start.

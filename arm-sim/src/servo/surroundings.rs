@@ -7,6 +7,7 @@ use super::units::COUNT;
 
 /// Where an obstacle is, seen from the joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) enum Side {
     /// It stops a joint that turns towards more counts.
     MoreCounts,
@@ -16,6 +17,7 @@ pub(crate) enum Side {
 
 /// An obstacle in the way of a joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Surface {
     pub(crate) side: Side,
     /// Where the joint touches it.
@@ -60,6 +62,7 @@ impl Surface {
 
 /// What acts on a joint from outside.
 #[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Surroundings {
     /// The torque of the arm's weight.
     pub(crate) weight: i64,

@@ -14,6 +14,7 @@ const STALL_SQUARE: u64 = 1_000_000;
 
 /// A servo's temperature.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Temperature {
     /// In thousandths of a degree Celsius.
     millidegrees: u64,

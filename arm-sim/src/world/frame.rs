@@ -9,6 +9,7 @@ pub(super) const UP: Point = Vector { x: 0.0, y: 0.0, z: 1.0 };
 
 /// A point and three directions at right angles to each other.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Frame {
     /// Its origin, in mm.
     pub origin: Vector<f64>,

@@ -42,6 +42,7 @@ const SUCTION: f64 = 3.0;
 
 /// An object in the room.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Object {
     /// Its name, form and weight, and where it was at first.
     pub item: Item,
@@ -94,6 +95,7 @@ pub(crate) struct Effect {
 
 /// The table, with everything on it.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct World {
     scene: Scene,
     walls: Vec<(Frame, Solid)>,

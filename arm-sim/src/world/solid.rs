@@ -7,6 +7,7 @@ use crate::scene::Form;
 
 /// A form round the origin of its frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) enum Solid {
     /// Half of its edges, in mm.
     Box([f64; 3]),

@@ -11,4 +11,6 @@ mod servo_faults;
 mod simulated_arm;
 mod simulated_servos;
 mod simulation;
+#[cfg(feature = "serde")]
+mod snapshot_bytes;
 mod stock_arm;

@@ -11,10 +11,10 @@ const PADS: f64 = 59.5;
 const BLOCKED_JOINTS: u8 = 195;
 
 /// An arm with a scene, switched on a second ago.
-struct Room(Simulation);
+pub struct Room(pub Simulation);
 
 impl Room {
-    fn new(scene: &str) -> Self {
+    pub fn new(scene: &str) -> Self {
         let mut arm = Simulation::default();
         arm.plant_mut().set_scene(Some(scene.parse().unwrap()));
         arm.advance(Duration::from_millis(1_000));
@@ -67,7 +67,7 @@ impl Room {
     }
 
     /// Grips what stands at this point, and lifts it.
-    fn pick(&mut self, x: f64, y: f64, z: f64) {
+    pub fn pick(&mut self, x: f64, y: f64, z: f64) {
         self.claws_to(60);
         self.tip_to(x, y, z + PADS + 60.0);
         self.line([x, y, z + PADS + 60.0], z + PADS);

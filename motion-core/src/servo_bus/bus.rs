@@ -42,6 +42,7 @@ pub struct HeldGoal {
 
 /// The registers of a read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Question {
     /// The measurements.
     Reading,
@@ -103,6 +104,7 @@ pub enum Outcome {
 
 /// The master's end of the servo bus.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Bus {
     byte_time: ByteTime,
     timeout: Duration,

@@ -4,6 +4,7 @@ use protocol_core::time::Duration;
 
 /// The time of a byte on the wire: ten bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ByteTime {
     /// The time of one bit, rounded up.
     bit_nanos: u32,

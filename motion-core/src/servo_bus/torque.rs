@@ -15,6 +15,7 @@ pub enum Torque {
 /// The two published code tables of the torque switch, servo register 40.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum TorqueCodes {
     /// 0 damping, 1 on, 2 free: the older table. Register 29 of the arm uses the same codes.
     #[default]

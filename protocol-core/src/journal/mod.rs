@@ -72,6 +72,7 @@ const NO_SETTINGS: Image = Image([0xFF; Image::LENGTH]);
 #[must_use]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Opened {
     /// Nothing was ever saved: the flash was blank, or the first start was interrupted.
     Fresh,
@@ -108,6 +109,7 @@ pub enum SaveError {
 
 /// The end of the log.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Tail {
     next: SlotAddress,
     generation: u32,
@@ -144,6 +146,7 @@ impl Tail {
 
 /// The log of settings on a flash of two sectors.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Journal<F> {
     sectors: Sectors<F>,
     tail: Tail,

@@ -13,6 +13,7 @@ pub(super) struct FlashRefused;
 
 /// The address of a slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct SlotAddress {
     /// 0 or 1.
     pub(super) sector: u32,
@@ -55,6 +56,7 @@ impl Survey {
 }
 
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Sectors<F>(pub(super) F);
 
 impl<F: NorFlash> Sectors<F> {

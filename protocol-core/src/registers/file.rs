@@ -17,7 +17,8 @@ use super::spec::Register;
 /// The bytes of the EEPROM region, which survive a power cut.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Image(pub [u8; Image::LENGTH]);
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Image(#[cfg_attr(feature = "serde", serde(with = "serde_bytes"))] pub [u8; Image::LENGTH]);
 
 impl Image {
     /// Bytes of the EEPROM region.
@@ -26,7 +27,9 @@ impl Image {
 
 /// The values of all 256 registers.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RegisterFile {
+    #[cfg_attr(feature = "serde", serde(with = "serde_bytes"))]
     values: [u8; 256],
     /// The offsets in sign and magnitude while 13 to 19 show them as 128 + offset (M5).
     offsets: Option<[u8; JOINTS]>,

@@ -6,6 +6,7 @@ pub const JOINTS: usize = 7;
 /// One of the seven joints. Users count from 1 (the base) to 7 (the claw); arrays count from 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Joint(u8);
 
 impl Joint {

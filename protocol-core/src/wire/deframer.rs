@@ -44,6 +44,7 @@ pub fn gap(baud: u32) -> Duration {
 
 /// Finds the frames of direction `D` in a stream of bytes.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Deframer<D> {
     buffer: heapless::Vec<u8, MAX_LENGTH>,
     search: Search,

@@ -16,6 +16,7 @@ use super::frame::{Defect, Direction, Frame, HEADER, MIN_LENGTH, ParseOutcome, p
 
 /// The state of the search. All fields are positions in the buffer.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Search {
     /// Everything before the head is finished.
     head: usize,

@@ -9,6 +9,7 @@ pub struct WrongChecksum;
 
 /// Finds the frames of either direction in a stream of bytes.
 #[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Decoder {
     buffer: heapless::Vec<u8, { Decoder::CAPACITY }>,
     /// Everything before the head is finished.
