@@ -1036,4 +1036,12 @@ class Simulation:
 
 @final
 class SimulationSnapshot:
-    """A simulated arm at one instant: servos, registers, settings and time."""
+    """A simulated arm at one instant: servos, registers, settings and time. Equal if all of it is equal.
+
+    `pickle` keeps it for the same version of this package. As any pickle, load it only if you trust where it is from.
+    """
+
+    @staticmethod
+    def _of_bytes(bytes: bytes) -> SimulationSnapshot: ...
+    def __eq__(self, value: object, /) -> bool: ...
+    def __hash__(self) -> int: ...

@@ -1,6 +1,7 @@
 //! `Simulation`: the arm behind `Arm.simulated()`, its clock, faults and hands.
 
 use std::collections::BTreeMap;
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::Mutex;
 use std::time::Duration;
 
@@ -10,6 +11,7 @@ use arm_sim::scene::SceneError;
 use arm_sim::world::Object;
 use motion_core::calibration::{MicroDegrees, counts_from_angle};
 use pyo3::prelude::*;
+use pyo3::types::PyBytes;
 use sevenbot::Joint;
 use sevenbot::simulated::SharedSimulation;
 
@@ -33,7 +35,9 @@ pub(crate) struct Simulation {
     process: u32,
 }
 
-/// A simulated arm at one instant: servos, registers, settings and time.
+/// A simulated arm at one instant: servos, registers, settings and time. Equal if all of it is equal.
+///
+/// `pickle` keeps it for the same version of this package. As any pickle, load it only if you trust where it is from.
 #[pyclass(frozen, module = "sevenbot")]
 pub(crate) struct SimulationSnapshot(Mutex<arm_sim::Simulation>);
 
@@ -45,6 +49,10 @@ impl SimulationSnapshot {
     /// A copy of the arm.
     pub(crate) fn arm(&self) -> arm_sim::Simulation {
         lock(&self.0).clone()
+    }
+
+    fn bytes(&self) -> Vec<u8> {
+        lock(&self.0).to_bytes()
     }
 }
 
@@ -280,6 +288,27 @@ impl Simulation {
 
 #[pymethods]
 impl SimulationSnapshot {
+    /// From the bytes of another: what `pickle` calls.
+    #[staticmethod]
+    fn _of_bytes(py: Python<'_>, bytes: &[u8]) -> PyResult<Self> {
+        let simulation = arm_sim::Simulation::from_bytes(bytes);
+        simulation.map(Self::of).map_err(|why| InvalidValue::raise(py, &why.to_string()))
+    }
+
+    fn __eq__(&self, other: &Self) -> bool {
+        self.bytes() == other.bytes()
+    }
+
+    fn __hash__(&self) -> u64 {
+        let mut hasher = DefaultHasher::new();
+        self.bytes().hash(&mut hasher);
+        hasher.finish()
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
+        Ok((py.get_type::<Self>().getattr("_of_bytes")?, (PyBytes::new(py, &self.bytes()),)))
+    }
+
     fn __repr__(&self) -> String {
         let micros = lock(&self.0).now().as_micros();
         format!("<SimulationSnapshot at {:.3} s>", Duration::from_micros(micros).as_secs_f64())

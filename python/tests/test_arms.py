@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import signal
 import threading
@@ -110,6 +111,25 @@ def test_masks_choose_arms() -> None:
     assert seen[:, 0] == pytest.approx([100, 100, 100], abs=1)
     arms.reset(None, arms.snapshot(2))
     assert (arms.observe()[0] == arms.observe()[1]).all()
+
+
+def seen_from(snapshot: sevenbot.SimulationSnapshot) -> NDArray[numpy.float64]:
+    """All observations of ten steps of two arms that begin with this one."""
+    arms = Arms(2, threads=1)
+    arms.reset(snapshot=snapshot)
+    return numpy.array([arms.step(actions(2, step)) for step in range(10)])
+
+
+def test_arms_of_another_process_begin_with_a_snapshot() -> None:
+    arms = Arms(3)
+    arms.fault(None, "line=corruption=5%")
+    arms.set_load(200)
+    for step in range(20):
+        arms.step(actions(3, step))
+    snapshot = arms.snapshot(1)
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        there = pool.apply(seen_from, (snapshot,))
+    assert there.tobytes() == seen_from(snapshot).tobytes()
 
 
 def test_a_wall_blocks_and_a_load_is_felt() -> None:

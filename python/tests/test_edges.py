@@ -12,6 +12,7 @@ import subprocess
 import sys
 import threading
 import time
+import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -423,6 +424,55 @@ def test_what_an_arm_tells_can_be_pickled(simulated_arm: sevenbot.SimulatedArm) 
         simulated_arm.sleep(0.2)
         counts = stream.counts
     assert counts.sent > 1 and pickle.loads(pickle.dumps(counts)) == counts
+
+
+def test_a_pickled_snapshot_is_the_same_arm(simulated_arm: sevenbot.SimulatedArm) -> None:
+    world = simulated_arm.simulation
+    world.scene = "cube red 30 40 0 200; cube blue 30 40 -80 190"
+    world.load_grams = 100
+    world.fault("1=wall=105/500")
+    world.fault("line=corruption=1%")
+    world.later(1, "fault 3=garbled=5")
+    simulated_arm.pose([120, *REST[1:]], wait=False)
+    simulated_arm.sleep(0.5)
+    snapshot = world.snapshot()
+    for other in [pickle.loads(pickle.dumps(snapshot)), copy.deepcopy(snapshot), copy.copy(snapshot)]:
+        assert other == snapshot and hash(other) == hash(snapshot) and repr(other) == repr(snapshot)
+    assert snapshot != 5 and snapshot is not other
+
+    def rest(snapshot: sevenbot.SimulationSnapshot) -> tuple[list[object], sevenbot.SimulationSnapshot]:
+        world.restore(snapshot)
+        seen: list[object] = []
+        for _ in range(10):
+            world.advance(0.2)
+            seen += [world.angles, world.faults, world.things]
+        return seen, world.snapshot()
+
+    assert rest(snapshot) == rest(other)
+    assert world.snapshot() != snapshot
+
+
+def test_bytes_that_are_no_snapshot_are_refused(simulated_arm: sevenbot.SimulatedArm) -> None:
+    reduced = simulated_arm.simulation.snapshot().__reduce__()
+    assert isinstance(reduced, tuple)
+    make, (content,) = reduced
+    assert isinstance(content, bytes) and isinstance(make(content), sevenbot.SimulationSnapshot)
+    middle = len(content) // 2
+    wrong = [
+        (b"", "not a snapshot"),
+        (b"x" + content, "not a snapshot"),
+        (content[:-1], "damaged"),
+        (content + b"\0", "damaged"),
+        (content[:middle] + bytes([content[middle] ^ 1]) + content[middle + 1 :], "damaged"),
+    ]
+    for other, words in wrong:
+        with pytest.raises(sevenbot.InvalidValue, match=words):
+            make(other)
+    # Another version, with the checksum that it would have.
+    text = len(b"7BotSim") + 1
+    part = content[text - 1 : text] + b"9" + content[text + 1 : -4]
+    with pytest.raises(ValueError, match=r"made by version 9\S+, and this is version \d"):
+        make(b"7BotSim" + part + zlib.crc32(part).to_bytes(4, "little"))
 
 
 def raise_of_file(path: str) -> None:
