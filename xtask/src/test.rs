@@ -76,8 +76,7 @@ const STAGES: &[Stage] = &[
             whole("start-up of the image", start_up::check),
             whole("recorded sessions, natively and in a WebAssembly module", replays::short),
             whole("instructions are within their budgets", || count::check(false)),
-            whole("worlds with injected faults", torture::short),
-            whole("fuzzing", fuzz::fixed),
+            whole("worlds with injected faults", torture::short).yielding(),
         ],
         // beside what mostly waits for an arm, a browser or a network.
         &[
@@ -88,7 +87,7 @@ const STAGES: &[Stage] = &[
                 system_tests::run_on(&system_tests::ADAPTER)
             }),
             whole("the page in a browser", || {
-                let variables = [("RUST_TEST_THREADS", "1"), ("POSES", "1000")];
+                let variables = [("RUST_TEST_THREADS", "2"), ("POSES", "1000")];
                 run("cargo", &format!("test {TESTED} --test browser"), &variables)
             }),
             whole("the Python package", python::check),
@@ -118,10 +117,13 @@ const STAGES: &[Stage] = &[
         }),
         quick("tests of the tasks", || cargo("test --package xtask")),
     ]],
-    &[&[quick("tests, and the system tests on the simulator", || {
-        // More threads than processors, because most system tests wait for an arm.
-        run("cargo", &format!("test {TESTED}"), &[("RUST_TEST_THREADS", "8")])
-    })]],
+    &[
+        &[whole("fuzzing", fuzz::fixed).yielding()],
+        &[quick("tests, and the system tests on the simulator", || {
+            // More threads than processors, because most system tests wait for an arm.
+            run("cargo", &format!("test {TESTED}"), &[("RUST_TEST_THREADS", "8")])
+        })],
+    ],
 ];
 
 /// Runs the steps, or does the work of one of them.
