@@ -113,3 +113,20 @@ fn a_stop_that_makes_room_for_a_program_is_news_for_it() {
     world.push();
     assert!(world.has_news(0));
 }
+
+/// A client that takes no answers: refused commands take no room each, and stops between them end the connection.
+#[test]
+fn a_queue_of_messages_has_an_end() {
+    for (flood, is_overrun) in [(r#"{"cmd":"ping"}"#, false), (r#"{"cmd":"stop"}"#, true)] {
+        let mut world = World::new(0);
+        world.join_page();
+        world.loses_replies = true;
+        world.send_message(0, READ_MESSAGE);
+        for _ in 0..300 {
+            world.send_message(0, r#"{"cmd":"ping"}"#);
+            world.send_message(0, flood);
+        }
+        world.run(10);
+        assert_eq!(world.pages[0].is_overrun(), is_overrun, "{flood}");
+    }
+}

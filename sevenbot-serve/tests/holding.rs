@@ -277,3 +277,28 @@ fn the_makers_stop_does_not_wait_for_the_commands_before_it() {
         assert_eq!(speeds(&world), SPEEDS);
     }
 }
+
+/// The reads have no replies, so nothing of the queue is carried out meanwhile.
+#[test]
+fn the_makers_stop_is_carried_out_however_many_commands_wait() {
+    for waiting in [19, 20, 21, 400] {
+        let mut world = moving_world();
+        world.loses_replies = true;
+        (0..waiting).for_each(|_| world.send_message(0, r#"{"cmd":"read","id":54,"num":7}"#));
+        world.run(30);
+        for message in [r#"{"cmd":"angle","id":0,"angle":165}"#, r#"{"cmd":"stop"}"#] {
+            world.send_message(0, message);
+        }
+        world.run(20);
+        assert_eq!(speeds(&world), [1; 7], "{waiting} commands wait");
+        world.loses_replies = false;
+        world.run(5_000);
+        assert_eq!(speeds(&world), SPEEDS);
+        assert_ne!(world.arm.registers().get(TARGET_POSITION.address), 165);
+        let answers: Vec<_> = world.pages[0].answers.iter().map(|(_, answer)| answer.as_str()).collect();
+        assert_eq!(answers.len(), waiting + 2, "each command is answered");
+        assert!(answers.last().is_some_and(|answer| answer.contains("Stopped")), "{answers:?}");
+        let refused = answers.iter().filter(|answer| answer.contains("Too many commands wait")).count();
+        assert_eq!(refused > 0, waiting > 200, "{refused} refused");
+    }
+}

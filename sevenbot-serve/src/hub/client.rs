@@ -17,7 +17,7 @@ use super::shares::Share;
 use super::stream::Stream;
 
 /// Requests of one client that may wait. The maker's arm has the same limit for its WebSocket.
-pub const MOST_WAITING: usize = 20;
+pub(crate) const MOST_WAITING: usize = 20;
 /// How long a request that moves or switches something may wait.
 pub const LONGEST_WAIT: Duration = Duration::from_millis(200);
 /// Reports that wait for a client to take them. More are dropped.

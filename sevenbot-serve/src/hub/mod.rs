@@ -54,7 +54,7 @@ use self::shares::Shares;
 use self::watchdog::ClientWatchdog;
 
 pub use self::admission::Admission;
-pub use self::client::{Event, LONGEST_WAIT, MOST_WAITING};
+pub use self::client::{Event, LONGEST_WAIT};
 pub use self::client_id::ClientId;
 pub use self::holding::HoldOutcome;
 pub use self::request::WholeRequest;

@@ -1,6 +1,8 @@
 //! A client of the maker's WebSocket: its commands one after the other, and the answers in their order.
 //!
 //! A stop is carried out when it comes, and drops the commands before it that move the arm. Only its answer keeps its place.
+//! So that a stop never waits behind other messages, a message is always taken. A command for which the queue has no room is
+//! refused, and its answer keeps its place, too.
 //!
 //! A read is always answered. All other commands are answered only to a browser: the maker's Python client does not wait
 //! for their answers, and takes the next message for the answer to its next read.
@@ -14,10 +16,15 @@ use serde_json::{Value, json};
 
 use super::block::has_solution;
 use super::command::{MakerCommand, MakerCommandError};
-use crate::hub::{Admission, ClientId, Event, HoldOutcome, Hub, MOST_WAITING, WholeRequest};
+use crate::hub::{Admission, ClientId, Event, HoldOutcome, Hub, WholeRequest};
 
 /// Answers that may wait for a client to take them. Its commands wait meanwhile.
 const MOST_ANSWERS: usize = 8;
+/// Commands that may wait. A pose takes 1.2 ms at 115 200 baud, and a target is dropped after 200 ms: a longer queue of targets would
+/// hold some that are dropped anyway.
+const MOST_COMMANDS: usize = 200;
+/// Stops between refused commands lengthen the queue further. A client with so many is disconnected.
+const MOST_WAITING: usize = 400;
 
 /// What waits for its turn.
 #[derive(Debug)]
@@ -29,6 +36,8 @@ enum Waiting {
     Stopped(Admission),
     /// A stop came after this command.
     Dropped,
+    /// So many commands in a row found no room, and wait for their answers.
+    Refused(usize),
 }
 
 /// A client of the maker's WebSocket.
@@ -65,18 +74,33 @@ impl MakerClient {
         self.id
     }
 
-    /// Can the client send another message?
-    #[must_use]
-    pub fn has_room(&self) -> bool {
-        self.waiting.len() < MOST_WAITING
-    }
-
-    /// Takes a message that was sent at `since` or later. Call it only if [`MakerClient::has_room`].
+    /// Takes a message that was sent at `since` or later.
     pub fn message(&mut self, since: Instant, text: &str) {
-        self.waiting.push_back(match MakerCommand::parse(text) {
+        let command = MakerCommand::parse(text);
+        if self.waiting.len() >= MOST_COMMANDS && command != Ok(MakerCommand::Stop) {
+            return self.refuse(is_read(&command));
+        }
+        self.waiting.push_back(match command {
             Ok(command) => Waiting::Command(since, command),
             Err(error) => Waiting::Wrong(error),
         });
+    }
+
+    /// Does the client go on with stops although hundreds of its messages wait for their answers?
+    #[must_use]
+    pub fn is_overrun(&self) -> bool {
+        self.waiting.len() >= MOST_WAITING
+    }
+
+    /// A command finds no room.
+    fn refuse(&mut self, is_read: bool) {
+        if !is_read && !self.is_browser {
+            return;
+        }
+        match self.waiting.back_mut() {
+            Some(Waiting::Refused(count)) => *count += 1,
+            _ => self.waiting.push_back(Waiting::Refused(1)),
+        }
     }
 
     /// Carries out commands, as far as possible. Call it after messages, after [`Hub::poll`] and [`Hub::arm_bytes`].
@@ -101,6 +125,7 @@ impl MakerClient {
                 Some(Waiting::Stopped(Admission::Queued)) => self.current = Some(MakerCommand::Stop),
                 Some(Waiting::Stopped(refused)) => self.answer(false, &done_or_refused("", refused)),
                 Some(Waiting::Dropped) => self.answer(false, &error("A stop came after this command")),
+                Some(Waiting::Refused(count)) => self.answer_refused(count),
             }
         }
     }
@@ -148,6 +173,14 @@ impl MakerClient {
         }
     }
 
+    /// Answers the first of the commands that found no room.
+    fn answer_refused(&mut self, count: usize) {
+        if count > 1 {
+            self.waiting.push_front(Waiting::Refused(count - 1));
+        }
+        self.answers.push_back(no_room().to_string());
+    }
+
     /// Ends a stop once the arm holds, or may not.
     fn finish_stop(&mut self, hub: &Hub) {
         let answer = match hub.hold_outcome() {
@@ -173,8 +206,7 @@ impl MakerClient {
                 self.answer(true, &json!({"status": "ok", "data": values}))
             }
             (Some(command), Event::NoReply { .. }) => {
-                let is_read = matches!(command, MakerCommand::Read { .. });
-                self.answer(is_read, &error("The arm does not answer"));
+                self.answer(is_read(&Ok(command)), &error("The arm does not answer"));
             }
             // Nothing is pushed: the programs of the maker take any message for an answer.
             (current, _) => self.current = current,
@@ -233,12 +265,24 @@ fn solution(before: &Event, after: &Event) -> Value {
 fn done_or_refused(done: &str, admission: Admission) -> Value {
     match admission {
         Admission::Queued => message(done),
-        Admission::NoRoom => error("Too many commands wait"),
+        Admission::NoRoom => no_room(),
         Admission::NoArm => error("The arm does not answer"),
         Admission::ReadOnly => error("The server is read-only"),
         Admission::Stopped => error("Another program stopped the arm: pause for a second to start anew"),
         Admission::Late => error("The command waited too long"),
         Admission::AnotherDrives => error("Another program drives the arm"),
+    }
+}
+
+fn no_room() -> Value {
+    error("Too many commands wait")
+}
+
+/// Does the sender of this message wait for an answer, whoever it is?
+fn is_read(command: &Result<MakerCommand, MakerCommandError>) -> bool {
+    match command {
+        Ok(command) => matches!(command, MakerCommand::Read { .. }),
+        Err(error) => error.is_read,
     }
 }
 

@@ -154,6 +154,11 @@ pub(super) trait Session {
     /// May another message be put?
     fn has_room(&self) -> bool;
 
+    /// Has the client sent more than it may, so that its connection ends?
+    fn is_overrun(&self) -> bool {
+        false
+    }
+
     /// Takes a message that the client sent at `since` or later.
     fn put(&mut self, since: Instant, message: Message);
 
@@ -212,7 +217,12 @@ impl Session for MakerSession {
     }
 
     fn has_room(&self) -> bool {
-        self.client.has_room()
+        // A stop behind other commands must not wait for them.
+        true
+    }
+
+    fn is_overrun(&self) -> bool {
+        self.client.is_overrun()
     }
 
     fn put(&mut self, since: Instant, message: Message) {
@@ -288,6 +298,9 @@ async fn serve<S, T: Session>(
                 end_at = shared.now() + CLOSE_TIMEOUT;
             }
             sender.start(message);
+        }
+        if session.is_overrun() {
+            break End::Broken;
         }
         let has_room = session.has_room();
         let waits_for_input = has_room && pace.free_at() <= shared.now();

@@ -265,10 +265,15 @@ impl World {
 }
 
 impl Page {
+    /// Would the server end the connection?
+    pub fn is_overrun(&self) -> bool {
+        self.client.is_overrun()
+    }
+
     /// As the server: a bounded number of messages at once.
     fn send(&mut self, hub: &mut Hub, now: Instant) {
         for _ in 0..20 {
-            let Some(message) = self.to_send.pop_front_if(|_| self.client.has_room()) else { break };
+            let Some(message) = self.to_send.pop_front_if(|_| !self.client.is_overrun()) else { break };
             self.client.message(now, &message);
         }
         self.client.advance(hub, now);
