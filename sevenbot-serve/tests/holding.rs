@@ -6,14 +6,18 @@ mod rig;
 
 use protocol_core::registers::Joint;
 use protocol_core::registers::map::{
-    FINE_TARGET, HOST_WATCHDOG, MOTOR_STATE, MOVING_JOINTS, SPEED, TARGET_POSITION, motor_state,
+    FINE_TARGET, HOST_WATCHDOG, MOTOR_STATE, MOVING_JOINTS, SET_POINT_PERIOD, SPEED, TARGET_POSITION,
+    motor_state,
 };
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use rig::{World, read, write};
+use sevenbot_serve::hub::HoldOutcome;
 
 const COMMAND: u8 = 239;
 const SPEEDS: [u8; 7] = [100, 90, 80, 70, 60, 50, 0];
+/// A set-point period of 20 ms.
+const PERIOD: [u8; 2] = [20, 0];
 
 /// The ways to a hold of the server.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -211,6 +215,79 @@ fn a_speed_that_a_program_writes_during_a_hold_is_kept() {
         assert_eq!(speeds(&world)[usize::from(joint)], speed, "{steps} steps of 0.1 ms after the hold began");
         assert!(speeds(&world).iter().all(|&speed| speed != 1));
     }
+}
+
+/// Program 0 streams to joint 1 with a point each 20 ms.
+fn streaming_world() -> World {
+    let mut world = moving_world();
+    let target = 16_000_u16.to_le_bytes();
+    world.send(0, &[write(SET_POINT_PERIOD.address, &PERIOD), write(FINE_TARGET.address, &target)].concat());
+    world.run(20);
+    world
+}
+
+fn period(world: &World) -> Vec<u8> {
+    world.arm.registers().read(SET_POINT_PERIOD.address, SET_POINT_PERIOD.count).to_vec()
+}
+
+/// The two frames that restore what the hold changed.
+fn restoring_frames() -> [Vec<u8>; 2] {
+    [write(SET_POINT_PERIOD.address, &PERIOD), write(SPEED.address, &SPEEDS)]
+}
+
+#[test]
+fn what_a_hold_restores_is_read_back_and_written_again() {
+    for way in WAYS {
+        for frame in restoring_frames() {
+            let mut world = streaming_world();
+            world.damaged_frame = (frame, 5);
+            begin_hold(&mut world, way);
+            while world.damaged_frame.1 > 0 {
+                world.take(1);
+                world.send(1, &read(SET_POINT_PERIOD.address, 2));
+                world.run(5);
+                let replies = world.take(1);
+                assert!(replies.iter().all(|(_, values)| *values == PERIOD), "{way:?} {replies:?}");
+            }
+            world.run(200);
+            assert_eq!((period(&world), speeds(&world)), (PERIOD.to_vec(), SPEEDS.to_vec()), "{way:?}");
+            assert_eq!(world.hub.hold_outcome(), Some(HoldOutcome::Holds), "{way:?}");
+            assert_eq!(world.hub.take_failed_hold(), None);
+        }
+    }
+}
+
+#[test]
+fn a_hold_that_cannot_restore_what_it_changed_is_told() {
+    for frame in restoring_frames() {
+        let mut world = streaming_world();
+        world.damaged_frame = (frame, usize::MAX);
+        begin_hold(&mut world, Way::Page);
+        world.run(1_000);
+        assert_eq!(world.hub.hold_outcome(), Some(HoldOutcome::NotRestored));
+        assert_eq!(world.hub.take_failed_hold(), Some(HoldOutcome::NotRestored));
+        assert!(world.pages[0].answers[0].1.contains("did not take back"), "{:?}", world.pages[0].answers);
+        world.damaged_frame.1 = 0;
+        begin_hold(&mut world, Way::Command);
+        world.run(200);
+        assert_eq!(world.hub.hold_outcome(), Some(HoldOutcome::Holds), "the next hold restores it");
+        assert_eq!((period(&world), speeds(&world)), (PERIOD.to_vec(), SPEEDS.to_vec()));
+    }
+}
+
+/// The port is lost between the targets and the period.
+#[test]
+fn a_period_that_an_outage_kept_from_the_arm_is_restored() {
+    let mut world = streaming_world();
+    world.damaged_frame = (restoring_frames()[0].clone(), usize::MAX);
+    begin_hold(&mut world, Way::Command);
+    world.run(40);
+    world.unplug();
+    world.run(1_000);
+    world.damaged_frame.1 = 0;
+    world.plug();
+    world.run(1_000);
+    assert_eq!((period(&world), speeds(&world)), (PERIOD.to_vec(), SPEEDS.to_vec()));
 }
 
 /// The first hold is at each of its steps when no reply comes any more, also at the end, where it restores the speeds.

@@ -2,11 +2,13 @@
 
 #![allow(clippy::expect_used, clippy::indexing_slicing, clippy::unwrap_used)] // A panic is a failed test.
 
+use protocol_core::registers::Map;
+use protocol_core::registers::map::SET_POINT_PERIOD;
 use protocol_core::request::Reply;
 use protocol_core::time::{Duration, Instant};
 use protocol_core::wire::FrameBuffer;
 use sevenbot_serve::Hub;
-use sevenbot_serve::hub::{Admission, ClientId, HoldOutcome, HubOptions};
+use sevenbot_serve::hub::{Admission, ClientId, HoldOutcome, HubOptions, WholeRequest};
 
 const SPEEDS: [u8; 7] = [60, 10, 20, 30, 40, 50, 0];
 const POSE: [u8; 7] = [81, 82, 83, 84, 85, 86, 87];
@@ -74,6 +76,23 @@ impl World {
 fn it_is_held_in_whole_degrees_behind_a_brake() {
     let mut world = World::new();
     assert_eq!(world.hub.stop_arm(world.now, world.client), Admission::Queued);
+    world.run(50);
+    assert_eq!(world.hub.hold_outcome(), Some(HoldOutcome::Holds));
+    let expected = [(32, vec![1; 7]), (46, POSE.to_vec()), (32, SPEEDS.to_vec())];
+    assert_eq!(world.writes, expected, "no register of the extended block");
+}
+
+/// A program takes it for an arm of this project.
+#[test]
+fn it_has_no_period_that_a_hold_restores() {
+    let mut world = World::new();
+    let period =
+        WholeRequest::Write { map: Map::V22, address: SET_POINT_PERIOD.address, values: vec![20, 0] };
+    world.hub.request(world.now, world.client, world.now, period);
+    world.run(50);
+    world.writes.clear();
+    world.registers[usize::from(SET_POINT_PERIOD.address)] = 0;
+    world.hub.stop_arm(world.now, world.client);
     world.run(50);
     assert_eq!(world.hub.hold_outcome(), Some(HoldOutcome::Holds));
     let expected = [(32, vec![1; 7]), (46, POSE.to_vec()), (32, SPEEDS.to_vec())];

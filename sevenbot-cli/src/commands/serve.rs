@@ -12,7 +12,7 @@ use sevenbot::network::{self, LocalServer, Registered, is_token};
 use sevenbot::open_port::OpenPort;
 use sevenbot::simulated::simulated_port;
 use sevenbot::{OpenError, ports};
-use sevenbot_serve::hub::HubOptions;
+use sevenbot_serve::hub::{HoldOutcome, HubOptions};
 use sevenbot_serve::server::{
     AccessPolicy, ArmLocation, Notice, RefusalReason, Server, ServerConfig, StartError, Stop, TlsFiles,
 };
@@ -303,6 +303,13 @@ fn report(notice: &Notice) {
              the time",
             port.display()
         )),
+        Notice::HoldFailed(HoldOutcome::NotRestored) => warn(format_args!(
+            "the server held the arm, which did not take back its speeds or its set-point period. Programs that need them \
+             have to write them again"
+        )),
+        Notice::HoldFailed(_) => {
+            warn(format_args!("the server held the arm, which did not confirm it: it may be moving"));
+        }
         Notice::Refused { peer, reason } => warn(format_args!(
             "a client was refused{}: {}",
             peer.map(|peer| format!(", {peer}")).unwrap_or_default(),

@@ -49,7 +49,7 @@ impl Hub {
             *faults |= if self.watchdog.has_acted() { fault::HOST_SILENT } else { 0 };
         }
         self.watchdog.overlay(address, values);
-        self.overlay_speeds(address, values);
+        self.overlay_changed(address, values);
         if let Some(client) = self.clients.get(&id) {
             client.own.overlay(address, values);
             self.sharing_state(now, id, client).overlay(address, values);

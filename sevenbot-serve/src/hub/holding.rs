@@ -1,8 +1,9 @@
-//! How the hub holds the arm: the brake first, then the steps of [`ArmHold`], and at the end the speeds from before.
+//! How the hub holds the arm: the brake first, then the steps of [`ArmHold`], and at the end the set-point period and the speeds from
+//! before.
 //!
 //! ```text
 //!   read the speeds, write 1, read ──▶ no reply: again, every 100 ms
-//!     └─▶ a reply: the steps of the hold ──▶ the arm holds ──▶ restore the speeds, until they are read back
+//!     └─▶ a reply: the steps of the hold ──▶ the arm holds ──▶ restore period and speeds, until they are read back
 //! ```
 //!
 //! Where the arm has to hold depends on a reply, and replies may be lost. So all joints are slowed down before the first
@@ -14,7 +15,7 @@ use protocol_core::registers::{JOINTS, Map};
 use protocol_core::time::Instant;
 
 use super::Hub;
-use super::arm_hold::{ArmHold, Frame, joined};
+use super::arm_hold::{ArmHold, Frame, Restoring, joined};
 use super::intent::Intent;
 use super::known_registers::KnownRegisters;
 use super::line::Owner;
@@ -33,13 +34,15 @@ pub enum HoldOutcome {
     Limp,
     /// It has not confirmed the hold: it may be moving.
     Unconfirmed,
+    /// It holds, or its motors are off. It has not taken back the set-point period or the speeds from before the hold.
+    NotRestored,
 }
 
 impl Hub {
     /// Holds the arm; after the hold in progress, if that still slows the joints down.
     pub(super) fn start_hold(&mut self) {
         self.hold_outcome = None;
-        if let Some(hold) = self.hold.as_mut().filter(|hold| !hold.is_finishing()) {
+        if let Some(hold) = self.hold.as_mut().filter(|hold| hold.restoring().is_none()) {
             return hold.want_again();
         }
         self.line.cancel_reads(Owner::Hold);
@@ -59,8 +62,16 @@ impl Hub {
         self.hold_outcome
     }
 
+    /// The outcome of a hold that failed since the last call.
+    pub const fn take_failed_hold(&mut self) -> Option<HoldOutcome> {
+        self.failed_hold.take()
+    }
+
     fn end_hold(&mut self, outcome: HoldOutcome) {
         self.hold_outcome = Some(outcome);
+        if matches!(outcome, HoldOutcome::Unconfirmed | HoldOutcome::NotRestored) {
+            self.failed_hold = Some(outcome);
+        }
         self.news.extend(self.clients.keys());
     }
 
@@ -107,8 +118,8 @@ impl Hub {
     pub(super) fn continue_hold(&mut self, now: Instant, address: u8, values: &[u8]) {
         let Some(mut hold) = self.hold.take() else { return };
         self.line.cancel_reads(Owner::Hold);
-        if hold.is_finishing() {
-            return self.finish_hold(now, hold, address, values);
+        if let Some(what) = hold.restoring() {
+            return self.restore(now, hold, what, address, values);
         }
         let frames = hold.frames(address, values, &self.held);
         self.write_targets(now, &frames);
@@ -116,46 +127,66 @@ impl Hub {
             false => self.hold = Some(hold),
             true if hold.is_wanted_again() => self.start_hold(),
             true if let Some(next) = hold.for_unmeasured() => self.hold = Some(next),
-            true if hold.is_confirmed() => self.hold = Some(hold.finishing()),
+            true if hold.is_confirmed() => {
+                let first = if self.is_period_changed { Restoring::Period } else { Restoring::Speeds };
+                self.hold = Some(hold.restore(first));
+            }
             // The joints stay slow: the arm may be moving.
             true => self.end_hold(HoldOutcome::Unconfirmed),
         }
     }
 
-    /// Writes the targets that hold the arm. A set-point period would delay them.
+    /// Writes the targets that hold the arm. A set-point period would delay them; the maker's firmware has none.
     fn write_targets(&mut self, now: Instant, frames: &[Frame]) {
         let period = self.known.word(SET_POINT_PERIOD.address);
-        let is_delayed = !frames.is_empty() && period != 0;
+        let is_delayed = !frames.is_empty() && period != 0 && self.known.is_ours();
         if is_delayed {
-            self.write_arm(now, SET_POINT_PERIOD.address, &[0, 0]);
+            self.is_period_changed = true;
+            self.line.send_write(now, Map::V22, SET_POINT_PERIOD.address, &[0, 0]);
         }
         for (address, values) in frames {
             self.note_targets(Intent::Hold, Map::V22, *address, values);
             self.write_arm(now, *address, values);
         }
         if is_delayed {
-            self.write_arm(now, SET_POINT_PERIOD.address, &period.to_le_bytes());
+            self.line.send_write(now, Map::V22, SET_POINT_PERIOD.address, &period.to_le_bytes());
         }
     }
 
-    /// The arm holds: restores the speeds, until none is that of the brake.
-    fn finish_hold(&mut self, now: Instant, mut hold: ArmHold, address: u8, values: &[u8]) {
-        let frames = self.speeds_to_restore(address, values);
+    /// The arm holds: restores what the hold changed, until a reply shows it.
+    fn restore(&mut self, now: Instant, mut hold: ArmHold, what: Restoring, address: u8, values: &[u8]) {
+        let frames = match what {
+            Restoring::Period => self.period_to_restore(values),
+            Restoring::Speeds => self.speeds_to_restore(address, values),
+        };
         if !frames.is_empty() && !hold.is_over() {
-            for (address, speeds) in &frames {
-                self.line.send_write(now, Map::V22, *address, speeds);
+            for (address, values) in &frames {
+                self.line.send_write(now, Map::V22, *address, values);
             }
             hold.verify();
             self.hold = Some(hold);
             return;
         }
-        self.is_slowed = false;
-        let place = MOTOR_STATE.address.checked_sub(address).map(usize::from);
-        let state = place.and_then(|place| values.get(place));
-        self.end_hold(match state {
-            Some(&motor_state::SERVO) => HoldOutcome::Holds,
-            _ => HoldOutcome::Limp,
-        });
+        let is_changed = !frames.is_empty();
+        if is_changed {
+            hold.give_up_restoring();
+        }
+        match what {
+            Restoring::Period => {
+                self.is_period_changed = is_changed;
+                self.hold = Some(hold.restore(Restoring::Speeds));
+            }
+            Restoring::Speeds => {
+                self.is_slowed = is_changed;
+                self.end_hold(outcome(&hold, address, values));
+            }
+        }
+    }
+
+    /// The set-point period of the clients, if the arm has another one.
+    fn period_to_restore(&self, found: &[u8]) -> Vec<Frame> {
+        let wanted = self.known.word(SET_POINT_PERIOD.address).to_le_bytes();
+        (found != wanted).then(|| (SET_POINT_PERIOD.address, wanted.to_vec())).into_iter().collect()
     }
 
     /// The speeds of joints that have that of the brake. The others are not written: a client may have written them since.
@@ -166,13 +197,14 @@ impl Hub {
         joined(is_slow.map(|(register, _)| (register, vec![self.known.byte(register)])))
     }
 
-    /// Replaces the speeds of the brake in a reply to a client: a client that remembers them would restore them later.
-    pub(super) fn overlay_speeds(&self, address: u8, values: &mut [u8]) {
+    /// Replaces what a hold changes for a while in a reply to a client: a client that remembers it would restore it later.
+    pub(super) fn overlay_changed(&self, address: u8, values: &mut [u8]) {
         if self.hold.is_none() {
             return;
         }
-        for (register, value) in
-            (address..=u8::MAX).zip(values).filter(|(register, _)| SPEED.holds(*register))
+        let is_changed =
+            |register| SPEED.holds(register) || (self.is_period_changed && SET_POINT_PERIOD.holds(register));
+        for (register, value) in (address..=u8::MAX).zip(values).filter(|(register, _)| is_changed(*register))
         {
             *value = self.known.byte(register);
         }
@@ -187,11 +219,24 @@ impl Hub {
         }
         let speeds = restored(self.known.speeds(), before.speeds());
         let was_slowed = std::mem::take(&mut self.is_slowed);
+        let was_period_changed = std::mem::take(&mut self.is_period_changed);
         if was_slowed && is_same && speeds != self.known.speeds() {
             self.known.set_speeds(&speeds);
-            self.is_slowed = true;
+            let period = before.word(SET_POINT_PERIOD.address).to_le_bytes();
+            self.known.write(Map::V22, SET_POINT_PERIOD.address, &period);
+            (self.is_slowed, self.is_period_changed) = (true, was_period_changed);
             self.start_hold();
         }
+    }
+}
+
+/// What came of a hold whose last reply has the motor state.
+fn outcome(hold: &ArmHold, address: u8, values: &[u8]) -> HoldOutcome {
+    let place = MOTOR_STATE.address.checked_sub(address).map(usize::from);
+    match place.and_then(|place| values.get(place)) {
+        _ if hold.is_unrestored() => HoldOutcome::NotRestored,
+        Some(&motor_state::SERVO) => HoldOutcome::Holds,
+        _ => HoldOutcome::Limp,
     }
 }
 

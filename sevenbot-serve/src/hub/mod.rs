@@ -100,8 +100,12 @@ pub struct Hub {
     hold: Option<ArmHold>,
     /// What came of the last hold.
     hold_outcome: Option<HoldOutcome>,
+    /// That of a hold that failed, until it was told.
+    failed_hold: Option<HoldOutcome>,
     /// A hold slowed the joints down, and has not restored their speeds.
     is_slowed: bool,
+    /// A hold changed the set-point period, and has not read back that it is restored.
+    is_period_changed: bool,
     held: HeldTargets,
     driver: Driver,
     /// Stops of all clients so far, wrapping.
@@ -128,7 +132,9 @@ impl Hub {
             watchdog: ClientWatchdog::default(),
             hold: None,
             hold_outcome: None,
+            failed_hold: None,
             is_slowed: false,
+            is_period_changed: false,
             held: HeldTargets::default(),
             driver: Driver::new(options.has_one_driver),
             stops: 0,

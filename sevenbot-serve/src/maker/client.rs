@@ -186,6 +186,9 @@ impl MakerClient {
         let answer = match hub.hold_outcome() {
             Some(HoldOutcome::Holds | HoldOutcome::Limp) => message("Stopped"),
             Some(HoldOutcome::Unconfirmed) => error("The arm did not confirm the stop: it may be moving"),
+            Some(HoldOutcome::NotRestored) => {
+                error("The arm is stopped, but did not take back its speeds or its set-point period")
+            }
             None if !hub.has_arm() || !hub.is_holding() => error("The arm does not answer"),
             None => return,
         };

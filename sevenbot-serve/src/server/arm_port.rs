@@ -55,6 +55,7 @@ impl ArmPort {
                 self.receive(hub, now, &mut notify);
                 hub.poll(now);
                 self.send(hub, now, &mut notify);
+                hub.take_failed_hold().map(Notice::HoldFailed).into_iter().for_each(&mut notify);
                 (hub.deadline(now).min(self.deadline(hub)), !hub.to_arm().is_empty())
             });
             tokio::select! {

@@ -5,6 +5,8 @@ use std::path::PathBuf;
 
 use tokio::sync::mpsc::Sender;
 
+use crate::hub::HoldOutcome;
+
 /// What happens to the server while it runs.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Notice {
@@ -19,6 +21,8 @@ pub enum Notice {
     },
     /// The port is open, and no 7Bot V2 answers.
     ArmSilent(PathBuf),
+    /// The server held the arm by itself, and that failed.
+    HoldFailed(HoldOutcome),
     /// A client was refused.
     Refused {
         /// Its address.

@@ -52,6 +52,8 @@ pub struct World {
     pub loses_replies: bool,
     /// Bytes to the arm are lost on the line.
     pub loses_requests: bool,
+    /// This frame to the arm is damaged on the line so many times.
+    pub damaged_frame: (Vec<u8>, usize),
     pub programs: Vec<Program>,
     pub pages: Vec<Page>,
 }
@@ -101,6 +103,7 @@ impl World {
             damages_next_byte: false,
             loses_replies: false,
             loses_requests: false,
+            damaged_frame: (Vec::new(), 0),
             programs: Vec::new(),
             pages: Vec::new(),
         };
@@ -196,12 +199,13 @@ impl World {
         }
         self.hub.poll(self.now);
         if self.is_plugged {
-            let room = self.arm.host_room().min(self.hub.to_arm().len());
+            let request = self.damaged_request();
+            let room = self.arm.host_room().min(request.len());
             let sent = match self.loses_requests {
                 true => room,
-                false => self.arm.host_send(self.now, &self.hub.to_arm()[..room]),
+                false => self.arm.host_send(self.now, &request[..room]),
             };
-            self.sent.extend(&self.hub.to_arm()[..sent]);
+            self.sent.extend(&request[..sent]);
             self.hub.sent_to_arm(sent);
             self.arm.advance(self.now, true);
             let mut received = self.arm.host_received().to_vec();
@@ -224,6 +228,24 @@ impl World {
         for page in &mut self.pages {
             page.take(&mut self.hub, self.now);
         }
+    }
+
+    /// The bytes of the hub up to the next frame that is damaged, or that frame with a wrong checksum.
+    fn damaged_request(&mut self) -> Vec<u8> {
+        let mut bytes = self.hub.to_arm().to_vec();
+        let (frame, times) = &mut self.damaged_frame;
+        let start =
+            bytes.windows(frame.len().max(1)).position(|window| window == frame).filter(|_| *times > 0);
+        match start {
+            Some(0) if self.arm.host_room() >= frame.len() => {
+                *times -= 1;
+                bytes.truncate(frame.len());
+                bytes[frame.len() - 1] ^= 0xFF;
+            }
+            Some(start) => bytes.truncate(start),
+            None => {}
+        }
+        bytes
     }
 
     /// What a program received since the last call.

@@ -4,7 +4,8 @@
 //! ```text
 //!   read which joints are silent or move ──▶ none: the arm holds
 //!     └─▶ read targets and positions ──▶ write the positions of these joints as targets ──▶ read again, until no target differs
-//!           └─▶ read the motor state and the speeds, until these are restored (`holding`)
+//!           └─▶ read the set-point period if it was changed, and then the motor state and the speeds, until these are restored
+//!               (`holding`)
 //! ```
 //!
 //! A joint that has reached its target keeps it ([D24](protocol_core::decisions#d24)). Its load draws it some tenths of a degree
@@ -13,8 +14,8 @@
 
 use host_link::keep_limits;
 use protocol_core::registers::map::{
-    FINE_POSITION, FINE_TARGET, LIMITS, MISSING_SERVOS, MOTOR_STATE, MOVING_JOINTS, PRESENT_POSITION, SPEED,
-    TARGET_POSITION,
+    FINE_POSITION, FINE_TARGET, LIMITS, MISSING_SERVOS, MOTOR_STATE, MOVING_JOINTS, PRESENT_POSITION,
+    SET_POINT_PERIOD, SPEED, TARGET_POSITION,
 };
 use protocol_core::registers::{JOINTS, Joint, Register};
 use protocol_core::time::{Duration, Instant};
@@ -32,6 +33,15 @@ const MOST_REPEATS: u8 = 40;
 
 /// A frame to write: the first register, and the values.
 pub(crate) type Frame = (u8, Vec<u8>);
+
+/// What is restored once the arm holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Restoring {
+    /// The set-point period.
+    Period,
+    /// The speeds.
+    Speeds,
+}
 
 /// A hold in progress.
 #[derive(Debug)]
@@ -58,8 +68,10 @@ pub(crate) struct ArmHold {
     is_brake_due: bool,
     /// The arm holds.
     is_done: bool,
-    /// It holds, and the speeds are being restored.
-    is_finishing: bool,
+    /// It holds, and this is being restored.
+    restoring: Option<Restoring>,
+    /// The arm did not take back something that was to be restored.
+    is_unrestored: bool,
     /// Another hold was wanted meanwhile: what this one has read may be older than that.
     is_wanted_again: bool,
 }
@@ -82,7 +94,8 @@ impl ArmHold {
             repeat_at: None,
             is_brake_due: true,
             is_done: false,
-            is_finishing: false,
+            restoring: None,
+            is_unrestored: false,
             is_wanted_again: false,
         }
     }
@@ -115,15 +128,16 @@ impl ArmHold {
             return None;
         }
         if self.repeat_at.replace(now + REPEAT_PERIOD).is_some() {
-            self.is_brake_due = !self.is_finishing;
+            self.is_brake_due = self.restoring.is_none();
         } else {
             self.held_meanwhile = 0;
         }
-        let (first, last) = match self.moving {
-            _ if self.is_finishing => (MOTOR_STATE, SPEED),
-            None => (MISSING_SERVOS, MOVING_JOINTS),
-            Some(_) if self.is_fine => (FINE_TARGET, LIMITS),
-            Some(_) => (TARGET_POSITION, PRESENT_POSITION),
+        let (first, last) = match (self.restoring, self.moving) {
+            (Some(Restoring::Period), _) => (SET_POINT_PERIOD, SET_POINT_PERIOD),
+            (Some(Restoring::Speeds), _) => (MOTOR_STATE, SPEED),
+            (None, None) => (MISSING_SERVOS, MOVING_JOINTS),
+            (None, Some(_)) if self.is_fine => (FINE_TARGET, LIMITS),
+            (None, Some(_)) => (TARGET_POSITION, PRESENT_POSITION),
         };
         Some((first.address, last.address + last.count - first.address))
     }
@@ -138,21 +152,31 @@ impl ArmHold {
         std::mem::replace(&mut self.is_brake_due, false)
     }
 
-    /// The arm holds: what is left are the speeds.
-    pub(crate) const fn finishing(mut self) -> Self {
-        (self.is_finishing, self.rounds) = (true, 0);
+    /// The arm holds: what is left is to be restored, this next.
+    pub(crate) const fn restore(mut self, what: Restoring) -> Self {
+        (self.restoring, self.rounds, self.repeat_at) = (Some(what), 0, None);
         self
     }
 
-    /// Are the speeds being restored?
-    pub(crate) const fn is_finishing(&self) -> bool {
-        self.is_finishing
+    /// What is being restored.
+    pub(crate) const fn restoring(&self) -> Option<Restoring> {
+        self.restoring
     }
 
-    /// The speeds were written, and have to be read.
+    /// It was written, and has to be read.
     pub(crate) const fn verify(&mut self) {
         self.repeat_at = None;
         self.rounds += 1;
+    }
+
+    /// The arm did not take it back.
+    pub(crate) const fn give_up_restoring(&mut self) {
+        self.is_unrestored = true;
+    }
+
+    /// Did the arm not take back something?
+    pub(crate) const fn is_unrestored(&self) -> bool {
+        self.is_unrestored
     }
 
     /// The registers of the targets and of the positions.
@@ -162,7 +186,7 @@ impl ArmHold {
 
     /// Is this step over? Either it succeeded, or it was tried often enough.
     pub(crate) const fn is_over(&self) -> bool {
-        (self.is_done && !self.is_finishing) || self.rounds >= MOST_ROUNDS
+        (self.is_done && self.restoring.is_none()) || self.rounds >= MOST_ROUNDS
     }
 
     /// Has the arm confirmed that it holds?
