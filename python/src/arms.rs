@@ -1,7 +1,7 @@
 //! `SimulatedArms`: many simulated arms that step together.
 
 use std::num::NonZeroUsize;
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 use std::thread::available_parallelism;
 use std::time::Duration;
 
@@ -16,7 +16,7 @@ use sevenbot::{Joint, names};
 use crate::arguments::whole;
 use crate::arrays::{self, each_number, given, is_single, numpy, writing};
 use crate::bulk;
-use crate::errors::{InvalidValue, raised};
+use crate::errors::{Closed, InvalidValue, raised, without_attribute};
 use crate::numbers::{Values, duration};
 use crate::simulation::{self, SimulationSnapshot, fault_location, fault_time};
 use crate::worker::lock;
@@ -38,14 +38,27 @@ const MOST_ARMS: i64 = 1_000_000;
 /// processor. Needs numpy.
 #[pyclass(frozen, module = "sevenbot")]
 pub(crate) struct SimulatedArms {
-    arms: Mutex<library::SimulatedArms>,
+    arms: Arc<Mutex<library::SimulatedArms>>,
+    /// A forked process has a copy of the arms, whose lock may be held for ever.
+    process: u32,
     count: usize,
     threads: NonZeroUsize,
 }
 
 impl SimulatedArms {
-    fn with<T: Send>(&self, py: Python<'_>, work: impl FnOnce(&mut library::SimulatedArms) -> T + Send) -> T {
-        py.detach(|| work(&mut lock(&self.arms)))
+    fn with<T: Send>(
+        &self,
+        py: Python<'_>,
+        work: impl FnOnce(&mut library::SimulatedArms) -> T + Send,
+    ) -> PyResult<T> {
+        if self.is_forked() {
+            return Err(Closed::raise_arms_forked(py));
+        }
+        Ok(py.detach(|| work(&mut lock(&self.arms))))
+    }
+
+    fn is_forked(&self) -> bool {
+        self.process != std::process::id()
     }
 
     /// A step with arrays of one type.
@@ -76,7 +89,7 @@ impl SimulatedArms {
         let out = arrays::out::<N>(py, out, [self.count, columns])?;
         let mut filled = writing(&out)?;
         let numbers = filled.as_slice_mut().map_err(arrays::gaps(py))?;
-        let done = self.with(py, |arms| work(arms, numbers));
+        let done = self.with(py, |arms| work(arms, numbers))?;
         drop(filled);
         done.map_err(|error| InvalidValue::raise(py, &error.to_string()))?;
         Ok(out.into_any())
@@ -133,7 +146,7 @@ impl SimulatedArms {
         let threads = threads.unwrap_or(NonZeroUsize::MIN);
         let seeds = arrays::seeds(count, seed, seeds)?;
         let arms = py.detach(|| library::SimulatedArms::new(&seeds, threads));
-        Ok(Self { arms: Mutex::new(arms), count, threads })
+        Ok(Self { arms: Arc::new(Mutex::new(arms)), process: std::process::id(), count, threads })
     }
 
     /// Sends each arm its action, the next set-point of seven angles of 0 to 180 degrees, lets `dt` pass, and reads its state.
@@ -163,7 +176,7 @@ impl SimulatedArms {
         let time = duration(py, period)?;
         let actions: PyReadonlyArray2<'_, f64> = given(actions, [self.count, 7], "actions")?;
         let numbers = actions.as_slice().map_err(arrays::gaps(py))?;
-        let sent = self.with(py, |arms| arms.send(numbers, time));
+        let sent = self.with(py, |arms| arms.send(numbers, time))?;
         sent.map_err(|error| InvalidValue::raise(py, &error.to_string()))
     }
 
@@ -228,8 +241,7 @@ impl SimulatedArms {
                 }
             }
             arms.reset(mask.as_deref(), snapshot.as_ref());
-        });
-        Ok(())
+        })
     }
 
     /// Gives the arms of the mask, or all with `None`, a fault, for `seconds` or until `clear` or `reset`. The words are those of
@@ -248,8 +260,7 @@ impl SimulatedArms {
             arms.each(mask.as_deref(), |_, arm| {
                 arm.set_fault(fault, time);
             });
-        });
-        Ok(())
+        })
     }
 
     /// Takes the faults of the arms of the mask, or of all, back: all, or those at one location, `"3"`, `"supply"`, `"line"`.
@@ -257,8 +268,7 @@ impl SimulatedArms {
     fn clear(&self, py: Python<'_>, mask: Option<&Bound<'_, PyAny>>, location: Option<&str>) -> PyResult<()> {
         let mask = self.mask(mask)?;
         let location = fault_location(py, location)?;
-        self.with(py, |arms| arms.each(mask.as_deref(), |_, arm| drop(arm.end_faults(location))));
-        Ok(())
+        self.with(py, |arms| arms.each(mask.as_deref(), |_, arm| drop(arm.end_faults(location))))
     }
 
     /// Hangs a weight on the tip of the arms of the mask, or of all: grams, 0 to 1000, one number or one for each of the n arms.
@@ -277,8 +287,7 @@ impl SimulatedArms {
             arms.each(mask.as_deref(), |index, arm| {
                 arm.plant_mut().set_load(grams.get(index).copied().unwrap_or_default());
             });
-        });
-        Ok(())
+        })
     }
 
     /// Makes the servos of the arms of the mask, or of all, stronger or weaker, and their gears stiffer: factors of the stall torque
@@ -303,8 +312,7 @@ impl SimulatedArms {
             arms.each(mask.as_deref(), |index, arm| {
                 arm.plant_mut().scale_servos(percent(&torque, index), percent(&friction, index));
             });
-        });
-        Ok(())
+        })
     }
 
     /// Writes registers of the arms of the mask, or of all, in one frame each: `arms.set("push-limit", 50)`. Names and numbers
@@ -320,15 +328,14 @@ impl SimulatedArms {
         let mask = self.mask(mask)?;
         let span = raised(py, names::parse(name))?;
         let bytes = raised(py, bytes(span, values.as_slice()))?;
-        self.with(py, |arms| arms.write(mask.as_deref(), span.address(), &bytes));
-        Ok(())
+        self.with(py, |arms| arms.write(mask.as_deref(), span.address(), &bytes))
     }
 
     /// A copy of an arm as it is now, by its number from 0: for `reset`, and for `Simulation.restore`.
     fn snapshot(&self, py: Python<'_>, arm: i64) -> PyResult<SimulationSnapshot> {
         let last = i64::try_from(self.count).unwrap_or(i64::MAX).saturating_sub(1);
         let index: usize = whole(py, "arm", arm, 0, last)?;
-        let copy = self.with(py, |arms| arms.arm(index).cloned());
+        let copy = self.with(py, |arms| arms.arm(index).cloned())?;
         copy.map(SimulationSnapshot::of).ok_or_else(|| InvalidValue::raise(py, "there is no such arm"))
     }
 
@@ -341,19 +348,19 @@ impl SimulatedArms {
             arms.each(None, |_, arm| rows.push(angles(arm).map(|angle| f64::from(angle) / 1_000.0)));
             rows
         });
-        bulk::angles(py, &rows)
+        bulk::angles(py, &rows.map_err(|error| without_attribute(py, error))?)
     }
 
     /// The virtual time of each arm in seconds: an array (n,).
     #[getter]
-    fn time<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+    fn time<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let times = self.with(py, |arms| {
             let mut times = Vec::new();
             let seconds = |micros| Duration::from_micros(micros).as_secs_f64();
             arms.each(None, |_, arm| times.push(seconds(arm.now().as_micros())));
             times
         });
-        PyArray1::from_vec(py, times)
+        Ok(PyArray1::from_vec(py, times.map_err(|error| without_attribute(py, error))?))
     }
 
     /// The most threads that step the arms.
@@ -368,6 +375,15 @@ impl SimulatedArms {
 
     fn __repr__(&self) -> String {
         format!("<SimulatedArms: {} arms, {} threads>", self.count, self.threads)
+    }
+}
+
+impl Drop for SimulatedArms {
+    fn drop(&mut self) {
+        if self.is_forked() {
+            // A thread that is not here may have been changing them: they are left as they are.
+            std::mem::forget(Arc::clone(&self.arms));
+        }
     }
 }
 

@@ -89,6 +89,17 @@ impl Closed {
             "open an arm in this process, or start it with multiprocessing's method \"spawn\"".to_owned();
         error::<Self>(py, "the arm is closed here: this process was forked off after it was opened", &[hint])
     }
+
+    /// As [`Self::raise_forked`], of arms that step together.
+    pub(crate) fn raise_arms_forked(py: Python<'_>) -> PyErr {
+        let hint =
+            "make them in this process, or start it with multiprocessing's method \"spawn\"".to_owned();
+        error::<Self>(
+            py,
+            "the arms are not usable here: this process was forked off after they were made",
+            &[hint],
+        )
+    }
 }
 
 /// An exception with its hints.

@@ -98,6 +98,45 @@ def test_a_forked_process_is_told_so() -> None:
     assert in_a_process(FORK).split()[0] == "0"
 
 
+FORK_OF_MANY = """
+import os, signal, threading, time, sevenbot
+arms = sevenbot.SimulatedArms(2000, threads=2)
+snapshot = arms.snapshot(0)
+steps = threading.Thread(target=arms.step, args=(None, 1.0))
+steps.start()
+time.sleep(0.05)
+child = os.fork()
+if child == 0:
+    signal.alarm(60)
+    calls = [
+        lambda: arms.step(None), arms.read, arms.observe, arms.reset, arms.clear, lambda: arms.snapshot(0),
+        lambda: arms.set("speed", 50), lambda: arms.set_load(10), lambda: arms.scale_servos(1, 1),
+    ]
+    for call in calls:
+        try:
+            call()
+            os._exit(1)
+        except sevenbot.Closed as error:
+            if "forked" not in str(error):
+                os._exit(2)
+    if hasattr(arms, "angles") or hasattr(arms, "time") or len(arms) != 2000:
+        os._exit(3)
+    own = sevenbot.SimulatedArms(2, threads=2)
+    own.reset(snapshot=snapshot)
+    own.step(None)
+    del arms
+    os._exit(0)
+assert steps.is_alive(), "the step has to last longer than the fork"
+print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
+steps.join()
+print(len(arms.read()))
+"""
+
+
+def test_a_process_forked_off_during_a_step_of_many_arms_is_told_so() -> None:
+    assert in_a_process(FORK_OF_MANY).split() == ["0", "2000"]
+
+
 NO_THREAD = """
 import os
 # More than a process can have: no thread begins.
