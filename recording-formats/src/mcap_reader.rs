@@ -16,6 +16,7 @@ use crate::cdr;
 use crate::joints::{names, to_degrees};
 use crate::messages::{JointState, RosMessage, Switch};
 use crate::read_error::{McapReadError, ReadError};
+use crate::topics::first_time;
 
 /// No recording of an arm has longer records. Without a bound, a damaged length would fill the memory.
 const LONGEST_RECORD: usize = 64 * 1_024 * 1_024;
@@ -73,6 +74,8 @@ struct Tracks {
 struct Track {
     /// The time of the first moment, since 1970.
     start: Duration,
+    /// Its time in the recording.
+    first_time: Duration,
     moments: Vec<Moment>,
 }
 
@@ -92,6 +95,9 @@ impl Tracks {
         let stamp = state.header.stamp.since_epoch().filter(|stamp| !stamp.is_zero());
         let time = stamp.unwrap_or(Duration::from_nanos(message.log_time));
         let track = self.by_topic.entry(message.channel.topic.clone()).or_default();
+        if track.moments.is_empty() {
+            (track.start, track.first_time) = (time, first_time(&message.channel.metadata));
+        }
         track.add(time, positions, self.vacuum)
     }
 
@@ -119,10 +125,8 @@ impl Tracks {
 impl Track {
     fn add(&mut self, at: Duration, radians: [f64; 7], vacuum: bool) -> Result<(), McapReadError> {
         let last = self.moments.last().map(|last| last.time);
-        if last.is_none() {
-            self.start = at;
-        }
         let (time, seconds) = (at.checked_sub(self.start), last.unwrap_or_default().as_secs_f64());
+        let time = time.map(|time| time.saturating_add(self.first_time));
         let time = time.ok_or(McapReadError::TimeGoesBack { seconds })?;
         match last {
             Some(last) if time < last => return Err(McapReadError::TimeGoesBack { seconds }),

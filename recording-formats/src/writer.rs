@@ -68,6 +68,8 @@ pub struct McapWriter<W: Write> {
     layout: McapLayout,
     channels: HashMap<&'static str, Channel>,
     chunk_begin: Option<Duration>,
+    /// The time of the first moment in the recording.
+    first_time: Duration,
     vacuum: Option<bool>,
     /// Moments that are in the output.
     written: u64,
@@ -92,18 +94,21 @@ impl<W: Write> McapWriter<W> {
             layout,
             channels: HashMap::new(),
             chunk_begin: None,
+            first_time: Duration::ZERO,
             vacuum: None,
             written: 0,
             open: 0,
         })
     }
 
-    /// Adds a moment, not earlier than the one before. `at`: its time since 1970, which the file has in the place of its own.
+    /// Adds a moment, not earlier than the one before. `at`: its time since 1970, which the file has in the place of its own. Of its
+    /// own times the file has that of the first moment.
     ///
     /// # Errors
     /// The output cannot be written. The file then ends with the moments of [`McapWriter::written`].
     pub fn add(&mut self, at: Duration, moment: &Moment, telemetry: &Telemetry) -> io::Result<()> {
         if self.vacuum.is_none() {
+            self.first_time = moment.time;
             self.describe(at)?;
         }
         if self.vacuum.replace(moment.vacuum) != Some(moment.vacuum) {
@@ -181,7 +186,8 @@ impl<W: Write> McapWriter<W> {
         }
         let schema =
             self.writer.add_schema(M::NAME, "ros2msg", M::DEFINITION.as_bytes()).map_err(io_error)?;
-        let id = self.writer.add_channel(schema, topic, "cdr", &Default::default()).map_err(io_error)?;
+        let metadata = topics::metadata(topic, self.first_time);
+        let id = self.writer.add_channel(schema, topic, "cdr", &metadata).map_err(io_error)?;
         Ok(Channel { id, next: 0 })
     }
 }

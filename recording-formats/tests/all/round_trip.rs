@@ -1,9 +1,16 @@
 //! What goes into a format comes out of it.
 
-use recording_formats::{Format, McapLayout, ReadError, read, write};
+use recording_formats::{Format, McapLayout, ReadError, convert, read, write};
 use sevenbot::recording::{Recording, RecordingError};
 
 use crate::{mcap_bytes, recording};
+
+/// Three moments, the first one 5 s after the start.
+const LATE: &str = "7bot-recording 2
+5.000 90 90 65 90 90 90 80 0
+5.020 90.25 90 65 90 90 90 80 0
+5.040 90.5 90 65 90 90 90 80 1
+";
 
 #[test]
 fn every_format_has_the_whole_recording() {
@@ -18,6 +25,21 @@ fn every_format_has_the_whole_recording() {
         let again = read(mcap_bytes(&recording, layout).as_slice()).expect("a recording");
         assert!(again.moments().eq(recording.moments()), "{layout:?}");
     }
+}
+
+#[test]
+fn every_format_has_the_time_of_the_first_moment() {
+    let recording = Recording::parse(LATE).expect("a recording");
+    let same = |bytes: &[u8]| read(bytes).expect("a recording").moments().eq(recording.moments());
+    for format in Format::ALL {
+        let mut bytes = Vec::new();
+        convert(LATE.as_bytes(), format, &mut bytes).expect("memory");
+        assert!(same(&bytes), "{format:?}");
+        let mut copy = Vec::new();
+        convert(bytes.as_slice(), Format::Mcap, &mut copy).expect("memory");
+        assert!(same(&copy), "{format:?}, and then MCAP");
+    }
+    assert!(same(&mcap_bytes(&recording, McapLayout::Live)), "recorded directly");
 }
 
 #[test]
