@@ -2,31 +2,31 @@
 //!
 //! If the wrist limits the reach, [`nearest_tip`] gives the point. If the bend of the hand or the guard limits it, the set
 //! of points has no simple shape. Then a grid search finds a point: coarse over the whole reach, then finer around the
-//! best.
+//! best. All points of its grids are in tenths, because at a thin edge of the set none may be in tenths beside an exact point.
 
 use kinematics::ik6;
 use kinematics::nearest::nearest_tip;
 
-use super::Vector;
 use super::guard::Guard;
 use super::target::TipTarget;
+use super::{Vector, rounded};
 
 /// Points in a millimetre.
 const TENTHS: f64 = 10.0;
-/// The coarsest grid, in millimetres, and how many of its points are on each side of the middle.
-const COARSE: f64 = 25.0;
+/// The coarsest grid, in millimetres, and how many of its points are on each side of the middle. Halves of it are the finer grids.
+const COARSE: f64 = 256.0 * FINE;
 const COARSE_STEPS: i32 = 16;
 /// The middle of the coarsest grid: above the shoulder.
 const MIDDLE: Vector = Vector::new(0.0, 0.0, 75.0);
 /// The finest grid, in millimetres.
-const FINE: f64 = 0.05;
+const FINE: f64 = 1.0 / TENTHS;
 
 /// The nearest point to `tip` that is within reach with the tool in this direction, and that the guard allows. `None` if
 /// there is none.
 pub(super) fn nearest(tip: Vector, tool: Vector, guard: Option<&Guard>) -> Option<Vector> {
     let wish = Wish { tip, tool, guard };
-    let exact = nearest_tip(tip, tool).filter(|&point| wish.is_allowed(point)).or_else(|| wish.searched())?;
-    Some(wish.in_tenths(exact).unwrap_or(exact))
+    let exact = nearest_tip(tip, tool).filter(|&point| wish.is_allowed(point));
+    exact.and_then(|point| wish.best(around(point, FINE, 2))).or_else(|| wish.searched())
 }
 
 /// A position that cannot be, and what is allowed instead.
@@ -46,22 +46,11 @@ impl Wish<'_> {
         ik6(point, self.tool).is_ok_and(|angles| self.guard.is_none_or(|guard| is_clear(angles, guard)))
     }
 
-    /// The point in tenths of a millimetre beside `exact` that is nearest to the tip.
-    fn in_tenths(&self, exact: Vector) -> Option<Vector> {
-        let tenths = |number: f64, step: i32| ((number * TENTHS).round() + f64::from(step)) / TENTHS;
-        let candidates =
-            cube(2).map(|(x, y, z)| Vector::new(tenths(exact.x, x), tenths(exact.y, y), tenths(exact.z, z)));
-        self.best(candidates)
-    }
-
     fn searched(&self) -> Option<Vector> {
-        let round = |middle: Vector, step: f64, steps: i32| {
-            cube(steps).map(move |(x, y, z)| middle + Vector::new(x.into(), y.into(), z.into()) * step)
-        };
-        let mut nearest = self.best(round(MIDDLE, COARSE, COARSE_STEPS))?;
+        let mut nearest = self.best(around(MIDDLE, COARSE, COARSE_STEPS))?;
         let mut step = COARSE / 2.0;
-        while step > FINE {
-            let next = self.best(round(nearest, step, 2)).unwrap_or(nearest);
+        while step > FINE / 2.0 {
+            let next = self.best(around(nearest, step, 2)).unwrap_or(nearest);
             // A better point may itself have a better neighbour.
             if self.distance(next) < self.distance(nearest) {
                 nearest = next;
@@ -90,6 +79,14 @@ impl Wish<'_> {
     }
 }
 
+/// The grid round a point, in tenths of a millimetre: so many steps in each direction.
+fn around(middle: Vector, step: f64, steps: i32) -> impl Iterator<Item = Vector> {
+    cube(steps).map(move |(x, y, z)| {
+        let Vector { x, y, z } = middle + Vector::new(x.into(), y.into(), z.into()) * step;
+        Vector::new(rounded(x, TENTHS), rounded(y, TENTHS), rounded(z, TENTHS))
+    })
+}
+
 /// Whole numbers from `-steps` to `steps` in three dimensions.
 fn cube(steps: i32) -> impl Iterator<Item = (i32, i32, i32)> {
     let line = move || -steps..=steps;
@@ -98,7 +95,7 @@ fn cube(steps: i32) -> impl Iterator<Item = (i32, i32, i32)> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::DOWN;
+    use super::super::{DOWN, PointText};
     use super::*;
 
     #[test]
@@ -131,5 +128,41 @@ mod tests {
         assert_eq!(nearest_tip(tip, up), None);
         let found = nearest(tip, up, None).expect("one");
         assert!(ik6(found, up).is_ok() && (found - tip).length() < 250.0, "{found:?}");
+    }
+
+    /// The point as it is printed and typed again.
+    fn typed(point: Vector) -> Vector {
+        let text = PointText(point).to_string();
+        let numbers: Vec<f64> = text.split(' ').map(|number| number.parse().expect("a number")).collect();
+        Vector::new(numbers[0], numbers[1], numbers[2])
+    }
+
+    #[track_caller]
+    fn check_typed(tip: Vector, tool: Vector) {
+        for guard in [None, Some(Guard::default())] {
+            if TipTarget::guarded(tip, tool, guard.as_ref()).is_err()
+                && let Some(point) = nearest(tip, tool, guard.as_ref())
+            {
+                let typed = TipTarget::guarded(typed(point), tool, guard.as_ref());
+                assert!(typed.is_ok(), "{tip:?} {tool:?}: {typed:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_nearest_point_can_be_typed_as_it_is_printed() {
+        // The edge of what is within reach is so thin there that no point beside the exact one is in tenths.
+        check_typed(Vector::new(256.467, 259.916, 337.429), Vector::new(-0.421_14, -0.766_053, -0.207_983));
+        let mut random = 1_u32;
+        let mut number = |range: f64| {
+            random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (f64::from(random >> 8) / f64::from(1_u32 << 23) - 1.0) * range
+        };
+        for _ in 0..30 {
+            let tip = Vector::new(number(500.0), number(500.0), number(400.0));
+            for tool in [DOWN, Vector::new(number(1.0), number(1.0), number(1.0))] {
+                check_typed(tip, tool);
+            }
+        }
     }
 }
