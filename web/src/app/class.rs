@@ -2,6 +2,8 @@
 
 use classroom::message::Refusal;
 use classroom::{Goals, LeaseEnd, LentArm, ToPupil};
+use wasm_bindgen::prelude::Closure;
+use wasm_bindgen::{JsCast, JsValue};
 use web_sys::HtmlInputElement;
 
 use super::class_socket::ClassSocket;
@@ -17,6 +19,8 @@ use crate::source::socket::SocketSource;
 
 /// Time between two attempts to connect again, in milliseconds.
 const RETRY_MS: f64 = 2_000.0;
+/// Time between two looks at the connection without a picture, in milliseconds.
+const LOOK_MS: i32 = 1_000;
 /// How the query of an address begins that leads to a class.
 const QUERY: &str = "?class";
 
@@ -30,6 +34,8 @@ impl App {
         let code = code.unwrap_or_else(|| kept("class-code"));
         self.dom.set_hidden("class", false);
         self.class = Some(ClassTab::default());
+        // Without the timer the page looks with each picture only.
+        let _ = look_without_pictures();
         for (id, value) in [("class-code", &code), ("class-name", &kept("class-name"))] {
             if let Ok(field) = self.dom.get::<HtmlInputElement>(id) {
                 field.set_value(value);
@@ -94,7 +100,7 @@ impl App {
         self.dom.set_hidden("class-there", false);
     }
 
-    /// With each picture: connects again, and says that the arm has stopped.
+    /// With each picture, and once a second: connects again, and says that the arm has stopped.
     pub(super) fn class_on(&mut self, time: f64) {
         let Some(class) = &mut self.class else { return };
         if class.is_lost(time) {
@@ -296,4 +302,16 @@ impl App {
         self.dom.choose("source", "simulator");
         text.into_iter().for_each(|text| self.dom.notice(self.language.text(text)));
     }
+}
+
+/// Lets the browser call us also in a tab in the background, which gets no pictures.
+fn look_without_pictures() -> Result<(), JsValue> {
+    let window = web_sys::window().ok_or("no window")?;
+    let look = Closure::<dyn FnMut()>::new(|| {
+        with_app(|app| app.class_on(browser_now()));
+    });
+    let call = look.as_ref().unchecked_ref();
+    window.set_interval_with_callback_and_timeout_and_arguments_0(call, LOOK_MS)?;
+    look.forget();
+    Ok(())
 }

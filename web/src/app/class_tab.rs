@@ -7,8 +7,8 @@ use crate::class::Membership;
 
 /// The class asks a tab that does not answer each 4 s, and others more often.
 const SILENCE_MS: f64 = 10_000.0;
-/// The most that one picture adds to a silence, in milliseconds.
-const LONGEST_PICTURE_MS: f64 = 1_000.0;
+/// The most that one look adds to a silence, in milliseconds.
+const LONGEST_LOOK_MS: f64 = 1_000.0;
 
 /// A tab in a class, or one that wants to join it.
 #[derive(Default)]
@@ -18,7 +18,7 @@ pub(super) struct ClassTab {
     pub(super) socket: Option<ClassSocket>,
     /// When to connect again, in the browser's milliseconds.
     pub(super) retry: Option<f64>,
-    /// For how long the class has said nothing while the page drew pictures, in milliseconds, and the time of the last picture.
+    /// For how long the class has said nothing while the page ran, in milliseconds, and the time of the last look.
     silence: (f64, f64),
     /// When to connect to the real arm again.
     pub(super) arm_retry: Option<f64>,
@@ -45,11 +45,11 @@ impl ClassTab {
         self.silence.0 = 0.0;
     }
 
-    /// Has the connection ended? A network that is gone closes nothing. `time`: of this picture.
+    /// Has the connection ended? A network that is gone closes nothing. `time`: of this look.
     pub(super) fn is_lost(&mut self, time: f64) -> bool {
         let (silence, last) = self.silence;
-        // A tab in the background gets no pictures, and may get the messages after the next one.
-        self.silence = (silence + (time - last).clamp(0.0, LONGEST_PICTURE_MS), time);
+        // A computer that was suspended looks before the browser hands over the messages.
+        self.silence = (silence + (time - last).clamp(0.0, LONGEST_LOOK_MS), time.max(last));
         self.socket.as_ref().is_some_and(|socket| socket.is_closed() || silence > SILENCE_MS)
     }
 }

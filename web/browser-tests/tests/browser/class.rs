@@ -222,6 +222,50 @@ fn a_line_to_the_real_arm_that_breaks_is_opened_again_and_a_class_that_falls_sil
     assert_eq!(mia.errors(), [""; 0]);
 }
 
+/// While `window.isInBackground`, the page gets no pictures, as in a tab in the background.
+const BACKGROUND: &str = "
+    const request = window.requestAnimationFrame;
+    window.requestAnimationFrame = act => request(time => window.isInBackground || act(time));";
+
+#[test]
+fn a_tab_in_the_background_notices_a_class_that_is_silent_and_one_that_is_gone() {
+    let class = ClassRun::start(false);
+    let teacher = class.open_teacher();
+    let mut mia = class.join_after(&teacher, "Mia", &format!("{KEEP_SOCKETS}{BACKGROUND}"));
+    mia.evaluate("window.isInBackground = true");
+    let of_class = socket("/class");
+    mia.evaluate(&format!("(window.silent = {of_class}).onmessage = null"));
+    wait_for("it connects again", || {
+        let sockets = mia.evaluate(&format!("[window.silent.readyState, {of_class}.readyState]"));
+        if sockets == serde_json::json!([3, 1]) { Ok(()) } else { Err(sockets.to_string()) }
+    });
+    mia.wait_for_text("#class-state", "You are in the class as Mia");
+    assert_eq!(mia.errors(), [""; 0]);
+    drop(class);
+    mia.wait_for_text("#class-state", "The connection to the class was lost. Trying again");
+}
+
+#[test]
+fn a_stop_without_a_connection_is_told_not_to_be_sent() {
+    let class = ClassRun::start(true);
+    let mut teacher = class.open_teacher();
+    let _mia = class.join(&teacher, "Mia");
+    let mut leo = class.join_after(&teacher, "Leo", KEEP_SOCKETS);
+    wait_for_tile(&mut teacher, "Mia", ".doing", "ready");
+    click_tile(&mut teacher, "Mia");
+    leo.wait_for_text("#class-arm", "Mia has the class's real arm for");
+    // The button is there until the page notices the end.
+    let of_class = socket("/class");
+    leo.evaluate(&format!("[{of_class}.close(), document.querySelector('#stop-class-arm').click()]"));
+    leo.wait_until_said("#notice", "NOT SENT: there is no connection to the class.");
+    leo.wait_for_text("#class-arm", "Mia has the class's real arm for");
+    assert_eq!([teacher.errors(), leo.errors()], [[""; 0]; 2]);
+    drop(class);
+    teacher.wait_for_text("#state", "The connection to `sevenbot class` was lost.");
+    teacher.click("#stop");
+    teacher.wait_for_text("#notice", "NOT SENT: there is no connection to `sevenbot class`.");
+}
+
 /// Measures a stop for all while thirty arms move.
 #[test]
 #[ignore = "ten minutes"]
