@@ -45,9 +45,10 @@ impl PointStream {
     /// No stream.
     pub const NONE: Self = Self { points: Vec::new(), last_due: Instant::ZERO };
 
-    /// Forgets the points.
+    /// Forgets the points and their grid: the next point begins a new stream.
     pub fn end(&mut self) {
         self.points.clear();
+        self.last_due = Instant::ZERO;
     }
 
     /// Has the joint passed all points?

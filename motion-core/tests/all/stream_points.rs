@@ -147,6 +147,24 @@ fn d23_a_coarse_target_ends_the_stream_at_once() {
 }
 
 #[test]
+fn d23_a_point_after_a_coarse_target_is_the_first_one_of_a_new_stream() {
+    let at = |millis: u64| Instant::from_micros(millis * 1_000);
+    let period = Duration::from_millis(200);
+    // On the grid of the stream that ended it would be due after 225 or 366 ms.
+    for frame in [1_280, 1_330] {
+        let mut trajectory = Trajectory::holding(MicroDegrees(0));
+        trajectory.stream_to(MicroDegrees(0), at(1_000), period);
+        trajectory.move_to(MicroDegrees(0), 0);
+        trajectory.stream_to(MicroDegrees(3_000_000), at(frame), period);
+        for millis in (10..=300).step_by(10) {
+            trajectory.advance(at(frame + millis), FASTEST);
+            let wanted = i32::try_from(millis).unwrap() * 10_000;
+            assert_eq!(trajectory.set_point(), MicroDegrees(wanted), "{millis} ms after {frame}");
+        }
+    }
+}
+
+#[test]
 fn d23_one_lost_frame_does_not_move_the_grid() {
     let times: Vec<u64> = (0..40).map(|k| 1_000_000 + k * 20_000).collect();
     let all = ramp(&times, 2_000_000);
