@@ -15,6 +15,7 @@ mod inertia;
 mod obstacles;
 mod outside;
 mod pose;
+mod rest;
 mod room;
 mod sine;
 mod supply;
@@ -38,6 +39,7 @@ use crate::world::World;
 pub use obstacles::{HIGHEST_STIFFNESS, STRONGEST_PUSH, Thing, Wall};
 pub use outside::OutsideState;
 use pose::{AngleScale, JointSines};
+use rest::Rest;
 use supply::Supply;
 pub use supply::{SupplyFault, UnknownSupplyFault};
 pub use weight::HEAVIEST_LOAD_G;
@@ -80,7 +82,8 @@ pub struct Plant {
     collisions: u64,
     /// The motors are simulated up to this time.
     now: Instant,
-    /// Steps that end by then change nothing but the sums behind the temperatures, unless a call changes a servo.
+    rests: [Rest; JOINTS],
+    /// Until then all servos rest and the supply does not change, unless a call changes them.
     rest_until: Instant,
 }
 
@@ -114,6 +117,7 @@ impl Plant {
             has_exact_times: true,
             collisions: 0,
             now,
+            rests: [Rest::NONE; JOINTS],
             rest_until: now,
         };
         plant.update_weight();
@@ -155,12 +159,13 @@ impl Plant {
     }
 
     fn handle_frames(&mut self, now: Instant, answer_at: Instant) {
-        let Self { decoder, servos, wire, supply, rest_until, .. } = self;
+        let Self { decoder, servos, wire, supply, rests, rest_until, .. } = self;
         while let Some(found) = decoder.pull() {
             // A servo does not answer a damaged frame.
             let Ok(frame) = found else { continue };
             if !matches!(Instruction::from_code(frame.code), Some(Instruction::Ping | Instruction::Read)) {
                 *rest_until = self.now;
+                servos.iter_mut().zip(rests.iter_mut()).for_each(|(servo, rest)| rest.end(servo, self.now));
             }
             supply.count_frame();
             for answer in servos.iter_mut().filter_map(|servo| servo.handle_frame(now, &frame)) {
@@ -196,10 +201,13 @@ impl Plant {
 
     fn advance(&mut self, now: Instant) {
         let oldest = now.as_micros().saturating_sub(LONGEST_CATCH_UP.as_micros());
-        self.now = self.now.max(Instant::from_micros(oldest));
+        if self.now.as_micros() < oldest {
+            self.wake();
+            self.now = Instant::from_micros(oldest);
+        }
         while self.now + STEP <= now {
             if self.now + STEP <= self.rest_until {
-                self.rest(now.min(self.rest_until));
+                self.pass(now.min(self.rest_until));
             } else {
                 self.step();
             }
@@ -208,18 +216,25 @@ impl Plant {
 
     /// Simulates one step.
     fn step(&mut self) {
-        self.now = self.now + STEP;
+        let before = self.now;
+        self.now = before + STEP;
         self.supply.step(self.now);
         let supply = self.supply_decivolts();
         let mut turned = [false; JOINTS];
-        for (servo, turned) in self.servos.iter_mut().zip(&mut turned) {
-            *turned = servo.step(self.now, supply);
+        for ((servo, rest), turned) in self.servos.iter_mut().zip(&mut self.rests).zip(&mut turned) {
+            if rest.until(supply) < self.now {
+                rest.end(servo, before);
+                *turned = servo.step(self.now, supply);
+                if !*turned {
+                    *rest = Rest::after_step(servo, self.now, supply);
+                }
+            }
         }
         if turned.contains(&true) {
             self.follow(turned);
         } else {
             let supply = self.supply_decivolts();
-            let ends = self.servos.iter().map(|servo| servo.rest_until(self.now, supply));
+            let ends = self.rests.iter().map(|rest| rest.until(supply));
             self.rest_until = ends.min().unwrap_or(self.now).min(self.supply.steady_until(self.now));
         }
         self.follow_in_room();
@@ -238,17 +253,15 @@ impl Plant {
         }
     }
 
-    /// Simulates the whole steps until `end`, which is not after `self.rest_until`.
-    fn rest(&mut self, end: Instant) {
+    /// Lets the whole steps until `end` pass, which is not after `self.rest_until`.
+    fn pass(&mut self, end: Instant) {
         let steps = (end - self.now).as_micros() / STEP.as_micros();
-        let steps = u32::try_from(steps).unwrap_or(u32::MAX);
-        self.servos.iter_mut().for_each(|servo| servo.rest(steps));
-        self.now = self.now + Duration::from_micros(STEP.as_micros() * u64::from(steps));
+        self.now = self.now + Duration::from_micros(STEP.as_micros() * steps);
     }
 
     /// The servos, for a change.
-    const fn servos_mut(&mut self) -> &mut [Servo; JOINTS] {
-        self.rest_until = self.now;
+    fn servos_mut(&mut self) -> &mut [Servo; JOINTS] {
+        self.wake();
         &mut self.servos
     }
 
@@ -267,9 +280,15 @@ impl Plant {
         let load_g = self.load_grams().into();
         let (torques, inertias) = (weight::torques(pose, load_g), inertia::inertias(pose, load_g));
         let (arm, scales) = (torques.into_iter().zip(inertias), self.scales);
-        for ((servo, scale), (torque, inertia)) in self.servos_mut().iter_mut().zip(scales).zip(arm) {
-            servo.set_arm(scale.torque_towards_counts(torque), inertia);
+        let servos = self.servos.iter_mut().zip(&mut self.rests).zip(scales);
+        for (((servo, rest), scale), (torque, inertia)) in servos.zip(arm) {
+            let torque = scale.torque_towards_counts(torque);
+            if servo.weight() != torque {
+                rest.end(servo, self.now);
+            }
+            servo.set_arm(torque, inertia);
         }
+        self.rest_until = self.now;
     }
 
     /// The supply voltage of the servos at the last call with a time, in 0.1 V. 0 without supply.

@@ -8,7 +8,7 @@ use super::supply::SupplyFault;
 use super::weight::HEAVIEST_LOAD_G;
 use crate::fault_count::FaultCount;
 use crate::parameters::ServoParameters;
-use crate::servo::{Servo, ServoFault};
+use crate::servo::ServoFault;
 
 impl Plant {
     /// Sets or removes the fault of a joint's servo.
@@ -22,7 +22,7 @@ impl Plant {
     /// How often the fault of a joint's servo took effect since it was set: see [`ServoFault`] for the units.
     #[must_use]
     pub fn fault_count(&self, joint: Joint) -> FaultCount {
-        self.servo(joint).map_or_else(FaultCount::default, Servo::fault_count)
+        self.counted(joint).map_or_else(FaultCount::default, |servo| servo.fault_count())
     }
 
     /// Sets or removes the fault of the supply. A servo restarts below 4.5 V, and reports a wrong voltage below 5 V.

@@ -110,7 +110,7 @@ impl Plant {
     }
 
     fn obstacle_counts(&self, joint: Joint) -> [FaultCount; 3] {
-        self.servo(joint).map(Servo::obstacle_counts).unwrap_or_default()
+        self.counted(joint).map(|servo| servo.obstacle_counts()).unwrap_or_default()
     }
 
     /// Is a thing between the claws?

@@ -75,9 +75,11 @@ impl Plant {
 
     /// The torques of contacts on joints 1 to 6, in mN m towards greater angles.
     fn set_contacts(&mut self, torques: [f64; 6]) {
-        for ((servo, scale), torque) in self.servos.iter_mut().zip(self.scales).zip(torques) {
+        let servos = self.servos.iter_mut().zip(&mut self.rests).zip(self.scales);
+        for (((servo, rest), scale), torque) in servos.zip(torques) {
             let torque = scale.torque_towards_counts(micronewton_metres(torque));
             if servo.contact() != torque {
+                rest.end(servo, self.now);
                 servo.set_contact(torque);
                 self.rest_until = self.now;
             }

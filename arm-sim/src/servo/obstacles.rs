@@ -24,6 +24,11 @@ impl Servo {
         self.motor.surroundings.inertia = inertia;
     }
 
+    /// The arm's torque. Its inertia has no effect on a joint at rest.
+    pub(crate) const fn weight(&self) -> i64 {
+        self.motor.surroundings.weight
+    }
+
     /// Sets the torque of what the arm touches in its room, in micronewton metres, towards more counts.
     pub(crate) const fn set_contact(&mut self, torque: i64) {
         self.motor.surroundings.contact = torque;
