@@ -165,11 +165,17 @@ impl Plant {
             let Ok(frame) = found else { continue };
             if !matches!(Instruction::from_code(frame.code), Some(Instruction::Ping | Instruction::Read)) {
                 *rest_until = self.now;
-                servos.iter_mut().zip(rests.iter_mut()).for_each(|(servo, rest)| rest.end(servo, self.now));
             }
             supply.count_frame();
-            for answer in servos.iter_mut().filter_map(|servo| servo.handle_frame(now, &frame)) {
-                wire.send(answer_at + answer.delay, &answer.bytes);
+            let addressed =
+                servos.iter_mut().zip(rests.iter_mut()).filter(|(servo, _)| servo.is_addressed_by(&frame));
+            for (servo, rest) in addressed {
+                if !servo.is_unchanged_by(&frame) {
+                    rest.end(servo, self.now);
+                }
+                if let Some(answer) = servo.handle_frame(now, &frame) {
+                    wire.send(answer_at + answer.delay, &answer.bytes);
+                }
             }
         }
     }
@@ -186,8 +192,7 @@ impl Plant {
     }
 
     /// Simulates the arm up to `now`, and returns the bytes that the controller has received by then.
-    #[must_use]
-    pub fn poll(&mut self, now: Instant) -> Vec<u8> {
+    pub fn poll(&mut self, now: Instant) -> &[u8] {
         self.advance(now);
         self.wire.take(now)
     }

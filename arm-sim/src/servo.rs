@@ -24,7 +24,7 @@ mod temperature;
 pub(crate) mod units;
 
 use motion_core::servo_bus::Torque;
-use motion_core::servo_bus::frame::{ServoFrame, ServoFrameBuffer};
+use motion_core::servo_bus::frame::{Instruction, ServoFrame, ServoFrameBuffer};
 use protocol_core::registers::Joint;
 use protocol_core::time::{Duration, Instant};
 
@@ -160,9 +160,14 @@ impl Servo {
         self.motor.set_parameters(parameters);
     }
 
+    /// Is a frame for this servo, or for all servos?
+    pub(crate) fn is_addressed_by(&self, frame: &ServoFrame<'_>) -> bool {
+        self.registers.is_addressed_by(frame)
+    }
+
     /// Executes a frame that ends at `now`, and returns the answer if there is one.
     pub fn handle_frame(&mut self, now: Instant, frame: &ServoFrame<'_>) -> Option<ServoAnswer> {
-        if !self.registers.is_addressed_by(frame) {
+        if !self.is_addressed_by(frame) {
             return None;
         }
         self.fault.count_frame();
@@ -172,6 +177,16 @@ impl Servo {
         let answer = self.registers.handle_frame(frame);
         self.apply_registers();
         answer.map(|mut bytes| ServoAnswer { delay: self.fault.inject(&mut bytes), bytes })
+    }
+
+    /// Does a frame leave the next steps as they are? It is a question, or a servo with torque holds all values already.
+    pub(crate) fn is_unchanged_by(&self, frame: &ServoFrame<'_>) -> bool {
+        let holds_values = || self.registers.holds(frame) && self.motor.is_started(self.registers.goal());
+        self.is_on == self.is_switched_on()
+            && match Instruction::from_code(frame.code) {
+                Some(Instruction::Ping | Instruction::Read) => true,
+                _ => self.is_on && holds_values(),
+            }
     }
 
     fn apply_registers(&mut self) {
@@ -186,7 +201,7 @@ impl Servo {
     }
 
     fn apply_torque_switch(&mut self) {
-        let is_on = self.torque_switch() == Torque::On;
+        let is_on = self.is_switched_on();
         if is_on && !self.is_on {
             self.is_held = false;
             self.motor.stop();
@@ -196,6 +211,10 @@ impl Servo {
             self.protection.release();
         }
         self.is_on = is_on;
+    }
+
+    fn is_switched_on(&self) -> bool {
+        self.registers.torque_switch() == self.config.torque_codes.code(Torque::On)
     }
 
     /// The setting of the torque switch.

@@ -1,7 +1,5 @@
 //! The servo bus behind the controller: simulated servos, or real ones.
 
-use alloc::vec::Vec;
-
 use protocol_core::time::{Duration, Instant};
 
 use crate::plant::Plant;
@@ -21,7 +19,7 @@ pub trait ServoBus {
     fn bytes(&mut self, now: Instant, bytes: &[u8]);
 
     /// Returns the bytes that the controller has received by `now`.
-    fn poll(&mut self, now: Instant) -> Vec<u8>;
+    fn poll(&mut self, now: Instant) -> &[u8];
 
     /// When the next bytes arrive. `None` if there are none, or if the time is unknown.
     fn deadline(&self) -> Option<Instant>;
@@ -50,7 +48,7 @@ impl ServoBus for Plant {
         Self::bytes(self, now, bytes);
     }
 
-    fn poll(&mut self, now: Instant) -> Vec<u8> {
+    fn poll(&mut self, now: Instant) -> &[u8] {
         Self::poll(self, now)
     }
 

@@ -244,8 +244,10 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
 
     fn simulate(&mut self, now: Instant, host_is_idle: bool) {
         // Real servos cannot catch up: an answer that has arrived but was not read has not timed out.
-        while !B::IS_REAL && self.next_event() < now {
-            self.process(self.next_event(), host_is_idle);
+        let mut event = self.next_event();
+        while !B::IS_REAL && event < now {
+            self.process(event, host_is_idle);
+            event = self.next_event();
         }
         self.process(now, host_is_idle);
     }
@@ -255,11 +257,13 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
         self.to_arm.advance(now);
         self.to_host.advance(now);
         let from_servos = self.bus.poll(now);
+        if !from_servos.is_empty() && !self.is_halted {
+            self.controller.servo_bytes(now, from_servos);
+        }
         self.end_due_faults();
         if self.is_halted {
             return;
         }
-        self.controller.servo_bytes(now, &from_servos);
         if host_is_idle && self.to_arm.is_empty() {
             self.pass_host_bytes();
         }

@@ -10,13 +10,15 @@ pub struct BusLine {
     answer_delay: Duration,
     to_servos: Vec<u8>,
     from_servos: Vec<u8>,
+    /// What the last poll returned.
+    polled: Vec<u8>,
 }
 
 impl BusLine {
     /// A line at `baud` bits per second, with this longest delay between the wire and this computer.
     #[must_use]
     pub const fn new(baud: u32, answer_delay: Duration) -> Self {
-        Self { baud, answer_delay, to_servos: Vec::new(), from_servos: Vec::new() }
+        Self { baud, answer_delay, to_servos: Vec::new(), from_servos: Vec::new(), polled: Vec::new() }
     }
 
     /// Adds bytes that have arrived from the servos.
@@ -45,8 +47,10 @@ impl ServoBus for BusLine {
         self.to_servos.extend_from_slice(bytes);
     }
 
-    fn poll(&mut self, _: Instant) -> Vec<u8> {
-        std::mem::take(&mut self.from_servos)
+    fn poll(&mut self, _: Instant) -> &[u8] {
+        self.polled.clear();
+        std::mem::swap(&mut self.polled, &mut self.from_servos);
+        &self.polled
     }
 
     fn deadline(&self) -> Option<Instant> {

@@ -94,7 +94,7 @@ pub fn exchange(stream: &mut UnixStream, plant: &mut Plant, now: Instant) -> io:
     if answers.is_empty() {
         return Ok(());
     }
-    match stream.write(&answers) {
+    match stream.write(answers) {
         Ok(count) if count == answers.len() => Ok(()),
         Err(error) if !is_temporary(&error) => Err(error),
         _ => {

@@ -148,7 +148,7 @@ impl ServosOnly {
 
     fn poll(&mut self, now: Instant) -> io::Result<()> {
         self.read_client(now)?;
-        let bytes = self.plant.poll(now);
+        let bytes = self.plant.poll(now).to_vec();
         self.show("<-", &bytes);
         self.adapter.push(now, &bytes);
         let block = self.adapter.take(now);

@@ -7,6 +7,7 @@
 
 use alloc::collections::VecDeque;
 use alloc::vec::Vec;
+use core::mem;
 
 use motion_core::servo_bus::ByteTime;
 use protocol_core::time::{Duration, Instant};
@@ -23,7 +24,9 @@ const DAMAGE: u8 = 0x55;
 struct FrameOnWire {
     /// The start of the first byte, if the wire is free by then.
     start: Instant,
-    bytes: VecDeque<u8>,
+    bytes: Vec<u8>,
+    /// Number of bytes that have arrived.
+    arrived: usize,
     /// The sender is a servo; otherwise this is the echo of the master.
     is_from_servo: bool,
 }
@@ -37,6 +40,10 @@ pub(crate) struct Wire {
     byte_time: ByteTime,
     /// In the order of the starts.
     queue: VecDeque<FrameOnWire>,
+    /// What the last call of [`Wire::take`] returned.
+    arrived: Vec<u8>,
+    /// Memory for the next transmission.
+    spare: Vec<u8>,
     /// The end of the last byte to the master.
     free_at: Instant,
     /// The end of the last byte from the master.
@@ -52,6 +59,8 @@ impl Wire {
             baud,
             byte_time: ByteTime::at_baud(baud),
             queue: VecDeque::new(),
+            arrived: Vec::new(),
+            spare: Vec::new(),
             free_at: Instant::ZERO,
             master_done_at: Instant::ZERO,
             driven_until: Instant::ZERO,
@@ -77,7 +86,7 @@ impl Wire {
         let mut free_at = self.free_at;
         for transmission in &mut self.queue {
             let start = transmission.start.max(free_at);
-            free_at = start + self.byte_time.of(transmission.bytes.len());
+            free_at = start + self.byte_time.of(transmission.bytes.len() - transmission.arrived);
             if !transmission.is_from_servo || start >= end || begin >= free_at + DRIVE_TIME {
                 continue;
             }
@@ -91,52 +100,56 @@ impl Wire {
 
     /// Lets a servo send bytes from `start` on.
     pub(crate) fn send(&mut self, start: Instant, bytes: &[u8]) {
-        self.insert(FrameOnWire { start, bytes: bytes.to_vec().into(), is_from_servo: true });
+        self.insert(start, bytes.iter().copied(), true);
     }
 
     /// Lets the master receive its own bytes, from `start` on; damaged if they collided.
     pub(crate) fn echo(&mut self, start: Instant, bytes: &[u8], has_collided: bool) {
         let damage = if has_collided { DAMAGE } else { 0 };
-        let bytes = bytes.iter().map(|byte| byte ^ damage).collect();
-        self.insert(FrameOnWire { start, bytes, is_from_servo: false });
+        self.insert(start, bytes.iter().map(|byte| byte ^ damage), false);
     }
 
-    fn insert(&mut self, transmission: FrameOnWire) {
-        let index = self.queue.partition_point(|earlier| earlier.start <= transmission.start);
-        self.queue.insert(index, transmission);
+    fn insert(&mut self, start: Instant, content: impl Iterator<Item = u8>, is_from_servo: bool) {
+        let mut bytes = mem::take(&mut self.spare);
+        bytes.clear();
+        bytes.extend(content);
+        let transmission = FrameOnWire { start, bytes, arrived: 0, is_from_servo };
+        if self.queue.back().is_none_or(|last| last.start <= start) {
+            self.queue.push_back(transmission);
+        } else {
+            let index = self.queue.partition_point(|earlier| earlier.start <= start);
+            self.queue.insert(index, transmission);
+        }
     }
 
     /// Takes the bytes that have arrived by `now`.
-    pub(crate) fn take(&mut self, now: Instant) -> Vec<u8> {
-        let mut arrived = Vec::new();
+    pub(crate) fn take(&mut self, now: Instant) -> &[u8] {
+        self.arrived.clear();
         while let Some(first) = self.queue.front_mut() {
             let start = first.start.max(self.free_at);
             let whole_bytes = self.byte_time.count_within(now - start);
-            let count = usize::try_from(whole_bytes).unwrap_or(usize::MAX).min(first.bytes.len());
+            let left = first.bytes.get(first.arrived..).unwrap_or(&[]);
+            let count = usize::try_from(whole_bytes).unwrap_or(usize::MAX).min(left.len());
             if count > 0 {
                 self.free_at = start + self.byte_time.of(count);
             }
-            if count < first.bytes.len() {
-                arrived.extend(first.bytes.drain(..count));
+            self.arrived.extend_from_slice(left.get(..count).unwrap_or(left));
+            if count < left.len() {
+                first.arrived += count;
                 break;
             }
             if first.is_from_servo {
                 self.driven_until = self.free_at + DRIVE_TIME;
             }
-            let whole = self.queue.pop_front().map_or(VecDeque::new(), |last| last.bytes);
-            // Usually one answer arrives at a time: then its memory is passed on.
-            if arrived.is_empty() {
-                arrived = whole.into();
-            } else {
-                arrived.extend(whole);
-            }
+            self.spare = self.queue.pop_front().map_or(Vec::new(), |last| last.bytes);
         }
-        arrived
+        &self.arrived
     }
 
     /// When the last byte of the next transmission arrives.
     pub(crate) fn deadline(&self) -> Option<Instant> {
-        self.queue.front().map(|first| first.start.max(self.free_at) + self.byte_time.of(first.bytes.len()))
+        let first = self.queue.front()?;
+        Some(first.start.max(self.free_at) + self.byte_time.of(first.bytes.len() - first.arrived))
     }
 
     /// Drops all bytes, as without power.

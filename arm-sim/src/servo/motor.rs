@@ -136,6 +136,11 @@ impl Motor {
         self.rate = rate.min(self.no_load_distance);
     }
 
+    /// Is this the goal of the last move?
+    pub(crate) fn is_started(&self, goal: Goal) -> bool {
+        self.target == i64::from(goal.position_counts) * COUNT
+    }
+
     /// Ends the move: set-point and target become the position, and the motor has no duty.
     pub(crate) const fn stop(&mut self) {
         self.set_point = self.position;

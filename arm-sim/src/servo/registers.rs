@@ -133,11 +133,26 @@ impl ServoRegisters {
 
     /// Executes this servo's item of a sync write, if there is one.
     fn execute_item(&mut self, register: u8, width: u8, items: &[u8]) {
-        let id = self.id();
-        let item = items.chunks_exact(usize::from(width) + 1).find(|item| item.first() == Some(&id));
-        if let Some([_, data @ ..]) = item {
+        if let Some(data) = self.item(width, items) {
             // A range beyond the registers has no effect, as in any write.
             let _ = self.write(register, data);
+        }
+    }
+
+    /// The values for this servo in the items of a sync write.
+    fn item<'a>(&self, width: u8, items: &'a [u8]) -> Option<&'a [u8]> {
+        let id = self.id();
+        let mut items = items.chunks_exact(usize::from(width) + 1).filter_map(<[u8]>::split_first);
+        items.find(|(first, _)| **first == id).map(|(_, data)| data)
+    }
+
+    /// Do the registers hold the values of a sync write already? Such a frame may start a move.
+    pub(super) fn holds(&self, frame: &ServoFrame<'_>) -> bool {
+        match (Instruction::from_code(frame.code), frame.params) {
+            (Some(Instruction::SyncWrite), [register, width, items @ ..]) => {
+                self.item(*width, items).is_none_or(|data| self.read(*register, *width) == Some(data))
+            }
+            _ => false,
         }
     }
 

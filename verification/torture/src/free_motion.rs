@@ -68,7 +68,7 @@ impl ServoBus for RecordedServos {
         self.plant.bytes(now, bytes);
     }
 
-    fn poll(&mut self, now: Instant) -> Vec<u8> {
+    fn poll(&mut self, now: Instant) -> &[u8] {
         self.plant.poll(now)
     }
 

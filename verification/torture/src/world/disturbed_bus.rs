@@ -170,7 +170,7 @@ impl DisturbedBus {
     /// Returns the bytes that reach the controller now.
     pub(super) fn receive(&mut self, now: Instant, rng: &mut SeededRng) -> Vec<u8> {
         let is_disturbed = self.disturbance != DisturbanceRates::default();
-        let mut bytes = self.plant.poll(now);
+        let mut bytes = self.plant.poll(now).to_vec();
         if !bytes.is_empty() {
             self.record_status(now, &bytes);
             if is_disturbed {
