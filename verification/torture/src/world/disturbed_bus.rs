@@ -48,6 +48,13 @@ pub(super) enum Availability {
     Uncertain,
 }
 
+impl Availability {
+    /// True if it has replied to every read for a while.
+    fn has_responded(self, now: Instant) -> bool {
+        matches!(self, Self::Responding(since) if now >= since)
+    }
+}
+
 /// The number of disturbed frames in a million.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct DisturbanceRates {

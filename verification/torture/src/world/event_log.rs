@@ -67,7 +67,7 @@ impl LogEntry {
         self.text.clear();
         self.text.push_str(what);
         self.bytes.clear();
-        self.bytes.extend(bytes.iter().take(MAX_BYTES));
+        self.bytes.extend_from_slice(bytes.get(..MAX_BYTES).unwrap_or(bytes));
         self.has_more = bytes.len() > MAX_BYTES;
     }
 }

@@ -105,23 +105,31 @@ impl TortureWorld {
     /// (D28).
     fn allow_own_targets(&self, arm: &mut PoweredArm) {
         for joint in Joint::ALL {
-            let before = arm.model.get(TARGET_POSITION.of(joint));
-            let offset = arm.model.offset(joint);
-            let degrees = |counts| angle_from_counts(joint, counts, offset).nearest_degree();
-            let gives_way = self.bus.truth(joint).may_give_way(self.now);
-            arm.model.own_targets[joint] = match arm.command_checker.goal(joint) {
-                _ if !arm.model.is_servo() => OwnTarget::Measured,
-                Some(counts) if gives_way => {
-                    let (goal, present) = (degrees(counts), degrees(self.bus.position(joint)));
-                    let (low, high) = (goal.min(present).saturating_sub(2), goal.max(present) + 2);
-                    // A set-point may lie beyond the end of the servo's range.
-                    let (low, high) = if matches!(counts, 0 | 1_023) { (0, 180) } else { (low, high) };
-                    OwnTarget::GaveWay { low, high, before }
-                }
-                _ if self.bus.may_be_let_go(joint, self.now) => OwnTarget::Before(before),
-                _ => OwnTarget::Measured,
-            };
-            arm.model.held_targets[joint] = arm.command_checker.held_goal(joint).map(degrees);
+            let held_goal = arm.command_checker.held_goal(joint);
+            let own_target = self.own_target(arm, joint);
+            arm.model.held_targets[joint] = held_goal.map(|counts| degrees(arm, joint, counts));
+            arm.model.own_targets[joint] = own_target;
+        }
+    }
+
+    fn own_target(&self, arm: &PoweredArm, joint: Joint) -> OwnTarget {
+        if !arm.model.is_servo() {
+            return OwnTarget::Measured;
+        }
+        let gives_way = self.bus.truth(joint).may_give_way(self.now);
+        match gives_way.then(|| arm.command_checker.goal(joint)).flatten() {
+            Some(counts) => {
+                let (goal, present) =
+                    (degrees(arm, joint, counts), degrees(arm, joint, self.bus.position(joint)));
+                let (low, high) = (goal.min(present).saturating_sub(2), goal.max(present) + 2);
+                // A set-point may lie beyond the end of the servo's range.
+                let (low, high) = if matches!(counts, 0 | 1_023) { (0, 180) } else { (low, high) };
+                OwnTarget::GaveWay { low, high, before: arm.model.get(TARGET_POSITION.of(joint)) }
+            }
+            None if self.bus.may_be_let_go(joint, self.now) => {
+                OwnTarget::Before(arm.model.get(TARGET_POSITION.of(joint)))
+            }
+            None => OwnTarget::Measured,
         }
     }
 
@@ -206,4 +214,9 @@ impl TortureWorld {
             arm.check_status(self.now, &self.bus, StatusChecker::motion_changed);
         }
     }
+}
+
+/// The angle of a joint in whole degrees, with its offset.
+fn degrees(arm: &PoweredArm, joint: Joint, counts: u16) -> u8 {
+    angle_from_counts(joint, counts, arm.model.offset(joint)).nearest_degree()
 }

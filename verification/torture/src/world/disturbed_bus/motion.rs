@@ -33,22 +33,19 @@ impl DisturbedBus {
             self.truths = PerJoint::default();
         }
         let is_undisturbed = self.is_undisturbed(now);
-        let limited =
-            if is_guarded && is_undisturbed { self.limited_joints(now) } else { PerJoint::default() };
+        let may_limit = is_guarded && is_undisturbed && self.are_read_often(now);
         for joint in Joint::ALL {
-            self.check_push(now, joint, limits[joint].filter(|_| limited[joint]))?;
-        }
-        for joint in Joint::ALL.into_iter().filter(|_| is_servo) {
-            let may_miss = !is_undisturbed || self.availability(joint) == Availability::Uncertain;
-            self.truths[joint].observe(now, self.plant.torque(joint), may_miss);
-            self.truths[joint].stands(now, self.plant.position_counts(joint));
-            self.truths[joint].pushes(now, self.plant.motor_torque(joint), limits[joint]);
-            self.truths[joint].reports(now, self.last_status[joint]);
-            if self.truths[joint].may_give_way(now) || self.has_wall[joint] {
-                self.motion_checker.may_recoil(joint, &self.plant);
+            let (availability, push) = (self.availability(joint), self.plant.motor_torque(joint));
+            let is_limited = may_limit && availability.has_responded(now);
+            self.check_push(now, joint, push, limits[joint].filter(|_| is_limited))?;
+            if is_servo {
+                let may_miss = !is_undisturbed || availability == Availability::Uncertain;
+                self.observe(now, joint, may_miss);
+                self.truths[joint].pushes(now, push, limits[joint]);
+                if self.truths[joint].may_give_way(now) || self.has_wall[joint] {
+                    self.motion_checker.may_recoil(joint, &self.plant);
+                }
             }
-        }
-        for joint in Joint::ALL {
             let meets_thing = joint.number() == 7 && self.has_thing;
             let meets_any = self.has_push[joint] || self.has_wall[joint] || meets_thing;
             if meets_any || self.plant.load_grams() > 0 {
@@ -58,21 +55,26 @@ impl DisturbedBus {
         self.motion_checker.check(now, is_servo, is_guarded && is_undisturbed, &self.plant)
     }
 
-    /// The joints whose push a controller can limit that is not disturbed.
-    fn limited_joints(&self, now: Instant) -> PerJoint<bool> {
-        let responds =
-            |joint| matches!(self.availability(joint), Availability::Responding(since) if now >= since);
-        let responding = PerJoint(Joint::ALL.map(responds));
-        // Each silent servo costs a timeout: with long ones the others are read a few times a second.
-        let is_read_often = self.timely_limit <= SHORT || responding == PerJoint::all(true);
-        if is_read_often { responding } else { PerJoint::default() }
+    /// Takes the truth about a joint.
+    fn observe(&mut self, now: Instant, joint: Joint, may_miss_orders: bool) {
+        let truth = &mut self.truths[joint];
+        truth.observe(now, self.plant.torque(joint), may_miss_orders);
+        truth.stands(now, self.plant.position_counts(joint));
+        truth.reports(now, self.last_status[joint]);
+    }
+
+    /// True if a controller that is not disturbed reads the servos that respond often enough to limit their pushes. Each silent
+    /// servo costs a timeout: with long ones the others are read a few times a second.
+    fn are_read_often(&self, now: Instant) -> bool {
+        self.timely_limit <= SHORT
+            || Joint::ALL.iter().all(|joint| self.availability(*joint).has_responded(now))
     }
 
     /// Checks the push of a joint. `limit` is what the controller keeps, if it can.
-    fn check_push(&mut self, now: Instant, joint: Joint, limit: Option<i16>) -> Check {
+    fn check_push(&mut self, now: Instant, joint: Joint, permille: i16, limit: Option<i16>) -> Check {
         let push = Push {
-            permille: self.plant.motor_torque(joint),
-            speed: self.plant.load(joint).saturating_sub(self.plant.motor_torque(joint)),
+            permille,
+            speed: self.plant.load(joint).saturating_sub(permille),
             limit,
             is_overloaded: self.plant.is_overloaded(joint),
         };

@@ -13,7 +13,7 @@ const MAX_SENT_FRAMES: usize = 8;
 #[derive(Debug)]
 pub(super) struct ReceivedCommands {
     decoder: Decoder,
-    /// The last frames of the controller.
+    /// The last frames of the controller, the newest one first.
     sent: VecDeque<Vec<u8>>,
 }
 
@@ -29,10 +29,11 @@ impl ReceivedCommands {
 
     /// The commands in `received`: the frame `sent`, as the servos receive it after disturbances.
     pub(super) fn of_frame(&mut self, sent: &[u8], received: &[u8]) -> Vec<DecodedCommand> {
-        if self.sent.len() == MAX_SENT_FRAMES {
-            self.sent.pop_front();
-        }
-        self.sent.push_back(sent.to_vec());
+        let is_full = self.sent.len() == MAX_SENT_FRAMES;
+        let mut kept = is_full.then(|| self.sent.pop_back()).flatten().unwrap_or_default();
+        kept.clear();
+        kept.extend_from_slice(sent);
+        self.sent.push_front(kept);
         let mut commands = Vec::new();
         for piece in received.chunks(Decoder::CAPACITY / 2) {
             self.decoder.push(piece);
