@@ -246,8 +246,15 @@ impl LineDirection {
             || !self.delayed.is_empty()
     }
 
-    /// Moves the bytes on up to `now`.
+    /// Moves the bytes on up to `now`. The line is mostly idle.
+    #[inline]
     pub(crate) fn advance(&mut self, now: Instant) {
+        if self.is_in_transit() {
+            self.move_on(now);
+        }
+    }
+
+    fn move_on(&mut self, now: Instant) {
         while let Some(&(due, byte)) = self.delayed.front().filter(|(due, _)| *due <= now) {
             self.pacer.push(due, &[byte]);
             self.delayed.pop_front();

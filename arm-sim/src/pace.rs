@@ -116,8 +116,10 @@ impl Pacer {
     /// Removes the first `count` of the bytes that have arrived.
     pub fn take(&mut self, count: usize) {
         let count = count.min(self.arrived);
-        self.queue.drain(..count);
-        self.arrived -= count;
+        if count > 0 {
+            self.queue.drain(..count);
+            self.arrived -= count;
+        }
     }
 
     /// When the next batch has arrived; `None` if no byte is in transit.

@@ -58,6 +58,9 @@ pub struct Plant {
     config: ServoConfig,
     servos: [Servo; JOINTS],
     scales: [AngleScale; JOINTS],
+    /// The pose for which the servos are loaded with the arm's weight, and the weight in the gripper in grams.
+    pose: JointSines,
+    weighed_g: Option<u16>,
     decoder: Decoder,
     wire: Wire,
     supply: Supply,
@@ -103,6 +106,8 @@ impl Plant {
             config,
             servos: Joint::ALL.map(servo),
             scales: Joint::ALL.map(AngleScale::of),
+            pose: JointSines::of([0; JOINTS]),
+            weighed_g: None,
             decoder: Decoder::new(),
             wire: Wire::at_baud(DELIVERED_BAUD),
             supply: Supply::default(),
@@ -204,7 +209,15 @@ impl Plant {
         self.wire.deadline()
     }
 
+    /// Simulates the whole steps up to `now`. Most calls come within a step.
+    #[inline]
     fn advance(&mut self, now: Instant) {
+        if self.now + STEP <= now {
+            self.catch_up(now);
+        }
+    }
+
+    fn catch_up(&mut self, now: Instant) {
         let oldest = now.as_micros().saturating_sub(LONGEST_CATCH_UP.as_micros());
         if self.now.as_micros() < oldest {
             self.wake();
@@ -281,8 +294,14 @@ impl Plant {
 
     /// Loads each servo with its share of the arm's weight and inertia in this pose.
     fn update_weight(&mut self) {
-        let pose = JointSines::of(self.angles());
-        let load_g = self.load_grams().into();
+        self.rest_until = self.now;
+        let load_g = self.load_grams();
+        let has_turned = self.pose.turn_to(self.angles());
+        if !has_turned && self.weighed_g == Some(load_g) {
+            return;
+        }
+        self.weighed_g = Some(load_g);
+        let (pose, load_g) = (self.pose, load_g.into());
         let (torques, inertias) = (weight::torques(pose, load_g), inertia::inertias(pose, load_g));
         let (arm, scales) = (torques.into_iter().zip(inertias), self.scales);
         let servos = self.servos.iter_mut().zip(&mut self.rests).zip(scales);
@@ -293,7 +312,6 @@ impl Plant {
             }
             servo.set_arm(torque, inertia);
         }
-        self.rest_until = self.now;
     }
 
     /// The supply voltage of the servos at the last call with a time, in 0.1 V. 0 without supply.

@@ -55,13 +55,24 @@ impl AngleScale {
 /// The sine and the cosine of an angle, in millionths.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SineAndCosine {
+    /// The angle in thousandths of a degree.
+    millidegrees: i64,
     pub(crate) sin: i64,
     pub(crate) cos: i64,
 }
 
 impl SineAndCosine {
     const fn of(millidegrees: i64) -> Self {
-        Self { sin: sine(millidegrees), cos: cosine(millidegrees) }
+        Self { millidegrees, sin: sine(millidegrees), cos: cosine(millidegrees) }
+    }
+
+    /// Changes the angle. Returns whether it is another one.
+    fn turn_to(&mut self, millidegrees: i64) -> bool {
+        let has_turned = millidegrees != self.millidegrees;
+        if has_turned {
+            *self = Self::of(millidegrees);
+        }
+        has_turned
     }
 }
 
@@ -90,6 +101,17 @@ impl JointSines {
             roll: SineAndCosine::of(roll),
             pitch: SineAndCosine::of(pitch),
         }
+    }
+
+    /// Turns the joints to these angles. Returns whether any part has another direction.
+    pub(crate) fn turn_to(&mut self, [_, rear, forearm, roll, pitch, _, _]: [i64; JOINTS]) -> bool {
+        let turned = [
+            self.rear.turn_to(rear),
+            self.drop.turn_to(forearm - LEVEL),
+            self.roll.turn_to(roll),
+            self.pitch.turn_to(pitch),
+        ];
+        turned.contains(&true)
     }
 }
 

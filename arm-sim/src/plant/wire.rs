@@ -123,8 +123,16 @@ impl Wire {
     }
 
     /// Takes the bytes that have arrived by `now`.
+    #[inline]
     pub(crate) fn take(&mut self, now: Instant) -> &[u8] {
         self.arrived.clear();
+        if !self.queue.is_empty() {
+            self.arrive(now);
+        }
+        &self.arrived
+    }
+
+    fn arrive(&mut self, now: Instant) {
         while let Some(first) = self.queue.front_mut() {
             let start = first.start.max(self.free_at);
             let whole_bytes = self.byte_time.count_within(now - start);
@@ -143,7 +151,6 @@ impl Wire {
             }
             self.spare = self.queue.pop_front().map_or(Vec::new(), |last| last.bytes);
         }
-        &self.arrived
     }
 
     /// When the last byte of the next transmission arrives.

@@ -273,6 +273,9 @@ impl Motor {
         if !self.mode.is_controlled() {
             return 0;
         }
+        if self.moved == 0 {
+            return self.load();
+        }
         let for_speed = self.moved * FULL_DUTY / self.no_load_distance.max(1);
         i16::try_from((self.duty - for_speed) * 1_000 / FULL_DUTY).unwrap_or(0)
     }

@@ -115,19 +115,21 @@ impl ServoRegisters {
     /// master cannot write keep their values.
     fn write(&mut self, register: u8, data: &[u8]) -> Option<()> {
         let start = usize::from(register);
+        let written = start..start + data.len();
         let is_locked = self.field(register::LOCK) != [0];
-        let slots = self.registers.get_mut(start..start + data.len())?;
-        let (mut address, mut is_goal, mut is_torque) = (register, false, false);
-        for (slot, &byte) in slots.iter_mut().zip(data) {
-            if is_writable(address, is_locked) && !(address == register::ID && byte > MAX_ID) {
-                *slot = byte;
+        let slots = self.registers.get_mut(written.clone())?;
+        // Most goals are those that the servo holds.
+        if slots != data {
+            for ((slot, &byte), address) in slots.iter_mut().zip(data).zip(register..) {
+                if is_writable(address, is_locked) && !(address == register::ID && byte > MAX_ID) {
+                    *slot = byte;
+                }
             }
-            is_goal |= (register::GOAL_POSITION..register::LOCK).contains(&address);
-            is_torque |= address == register::TORQUE_SWITCH;
-            address = address.wrapping_add(1);
         }
-        self.has_new_goal |= is_goal;
-        self.is_torque_written |= is_torque;
+        let includes_any =
+            |first: u8, end: u8| written.start < usize::from(end) && usize::from(first) < written.end;
+        self.has_new_goal |= !data.is_empty() && includes_any(register::GOAL_POSITION, register::LOCK);
+        self.is_torque_written |= written.contains(&usize::from(register::TORQUE_SWITCH));
         Some(())
     }
 
