@@ -74,6 +74,8 @@ pub struct Servo {
     push_count: FaultCount,
     /// What the registers hold, apart from the measurements of the motor.
     reported: Option<Reported>,
+    /// The registers hold the measurements of an earlier step: they are brought up to date when a frame comes.
+    is_reading_old: bool,
 }
 
 /// What a servo reports apart from the measurements of its motor.
@@ -104,6 +106,7 @@ impl Servo {
             thing_count: FaultCount::default(),
             push_count: FaultCount::default(),
             reported: None,
+            is_reading_old: false,
         }
     }
 
@@ -114,13 +117,13 @@ impl Servo {
         self.is_on = false;
         self.protection.release();
         self.fault.start();
-        self.reported = None;
+        (self.reported, self.is_reading_old) = (None, false);
     }
 
     /// Sets the id. All other registers get their factory settings.
     pub fn set_id(&mut self, id: u8) {
         self.registers = ServoRegisters::new(id);
-        self.reported = None;
+        (self.reported, self.is_reading_old) = (None, false);
     }
 
     /// The id.
@@ -174,6 +177,7 @@ impl Servo {
         if !self.has_power(now) {
             return None;
         }
+        self.update_reading();
         let answer = self.registers.handle_frame(frame);
         self.apply_registers();
         answer.map(|mut bytes| ServoAnswer { delay: self.fault.inject(&mut bytes), bytes })
@@ -291,6 +295,7 @@ impl Servo {
 
     /// Turns it by hand, and holds it there. A servo with torque turns back.
     pub fn move_by_hand(&mut self, counts: u16) {
+        self.update_reading();
         self.motor.turn_to(counts);
         self.hold_by_hand(true);
     }

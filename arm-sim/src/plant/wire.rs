@@ -132,6 +132,7 @@ impl Wire {
         &self.arrived
     }
 
+    #[inline(never)]
     fn arrive(&mut self, now: Instant) {
         while let Some(first) = self.queue.front_mut() {
             let start = first.start.max(self.free_at);

@@ -6,6 +6,7 @@ impl Servo {
     /// Another simulation moves the joint, and measured this: the position in millionths of a count, the distance in a step, and
     /// the load in 0.1 %.
     pub(crate) fn measure(&mut self, position: i64, moved: i64, load: i16) {
+        self.update_reading();
         self.motor.measure(position, moved, i64::from(load) * 1_000);
     }
 

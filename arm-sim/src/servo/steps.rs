@@ -121,6 +121,7 @@ impl Servo {
     fn update_errors(&mut self, errors: u8) {
         self.registers.set_errors(errors);
         if self.protection.unload(errors, self.registers.limits()) && self.is_on {
+            self.update_reading();
             self.motor.stop();
             self.motor.start(self.registers.goal());
         }
@@ -128,15 +129,22 @@ impl Servo {
 
     fn update_registers(&mut self, voltage_decivolts: u8) {
         let reported = self.report(voltage_decivolts);
-        self.reported = Some(reported);
+        (self.reported, self.is_reading_old) = (Some(reported), true);
+        self.update_errors(reported.errors);
+    }
+
+    /// Writes the measurements of the last step that changed any into the registers. Call it before anything but a step changes
+    /// the motor.
+    pub(super) fn update_reading(&mut self) {
+        let Some(reported) = self.reported.filter(|_| self.is_reading_old) else { return };
+        self.is_reading_old = false;
         self.registers.set_reading(&Reading {
             position_counts: self.motor.position_counts(),
             speed: self.motor.speed(),
             load: self.motor.load(),
-            voltage_decivolts,
+            voltage_decivolts: reported.decivolts,
             temperature_celsius: reported.celsius,
         });
         self.registers.set_moving(self.motor.is_moving());
-        self.update_errors(reported.errors);
     }
 }
