@@ -18,6 +18,7 @@ mod pose;
 mod rest;
 mod room;
 mod sine;
+mod steps;
 mod supply;
 mod weight;
 mod wire;
@@ -30,7 +31,7 @@ use motion_core::servo_bus::Torque;
 use motion_core::servo_bus::frame::{Decoder, Instruction};
 use protocol_core::registers::map::TARGET_POSITION;
 use protocol_core::registers::{JOINTS, Joint};
-use protocol_core::time::{Duration, Instant};
+use protocol_core::time::Instant;
 
 use crate::fault_count::FaultCount;
 use crate::servo::units::STEP;
@@ -47,9 +48,6 @@ use wire::Wire;
 
 /// The baud rate of servos as delivered, in bits per second.
 const DELIVERED_BAUD: u32 = 1_000_000;
-
-/// If no call comes for longer than this, the arm stands still during the time before.
-const LONGEST_CATCH_UP: Duration = Duration::from_millis(100_000);
 
 /// Seven servos on one wire.
 #[derive(Clone, Debug)]
@@ -217,66 +215,6 @@ impl Plant {
         }
     }
 
-    fn catch_up(&mut self, now: Instant) {
-        let oldest = now.as_micros().saturating_sub(LONGEST_CATCH_UP.as_micros());
-        if self.now.as_micros() < oldest {
-            self.wake();
-            self.now = Instant::from_micros(oldest);
-        }
-        while self.now + STEP <= now {
-            if self.now + STEP <= self.rest_until {
-                self.pass(now.min(self.rest_until));
-            } else {
-                self.step();
-            }
-        }
-    }
-
-    /// Simulates one step.
-    fn step(&mut self) {
-        let before = self.now;
-        self.now = before + STEP;
-        self.supply.step(self.now);
-        let supply = self.supply_decivolts();
-        let mut turned = [false; JOINTS];
-        for ((servo, rest), turned) in self.servos.iter_mut().zip(&mut self.rests).zip(&mut turned) {
-            if rest.until(supply) < self.now {
-                rest.end(servo, before);
-                *turned = servo.step(self.now, supply);
-                if !*turned {
-                    *rest = Rest::after_step(servo, self.now, supply);
-                }
-            }
-        }
-        if turned.contains(&true) {
-            self.follow(turned);
-        } else {
-            let supply = self.supply_decivolts();
-            let ends = self.rests.iter().map(|rest| rest.until(supply));
-            self.rest_until = ends.min().unwrap_or(self.now).min(self.supply.steady_until(self.now));
-        }
-        self.follow_in_room();
-    }
-
-    /// The arm after a step in which these joints turned.
-    fn follow(&mut self, [_, shoulder, elbow, roll, pitch, _, claw]: [bool; JOINTS]) {
-        if claw {
-            self.follow_claw();
-        }
-        // The others carry no weight, and change no inertia.
-        if shoulder || elbow || roll || pitch {
-            self.update_weight();
-        } else {
-            self.rest_until = self.now;
-        }
-    }
-
-    /// Lets the whole steps until `end` pass, which is not after `self.rest_until`.
-    fn pass(&mut self, end: Instant) {
-        let steps = (end - self.now).as_micros() / STEP.as_micros();
-        self.now = self.now + Duration::from_micros(STEP.as_micros() * steps);
-    }
-
     /// The servos, for a change.
     fn servos_mut(&mut self) -> &mut [Servo; JOINTS] {
         self.wake();
@@ -290,28 +228,6 @@ impl Plant {
             *angle = scale.angle(servo.position());
         }
         angles
-    }
-
-    /// Loads each servo with its share of the arm's weight and inertia in this pose.
-    fn update_weight(&mut self) {
-        self.rest_until = self.now;
-        let load_g = self.load_grams();
-        let has_turned = self.pose.turn_to(self.angles());
-        if !has_turned && self.weighed_g == Some(load_g) {
-            return;
-        }
-        self.weighed_g = Some(load_g);
-        let (pose, load_g) = (self.pose, load_g.into());
-        let (torques, inertias) = (weight::torques(pose, load_g), inertia::inertias(pose, load_g));
-        let (arm, scales) = (torques.into_iter().zip(inertias), self.scales);
-        let servos = self.servos.iter_mut().zip(&mut self.rests).zip(scales);
-        for (((servo, rest), scale), (torque, inertia)) in servos.zip(arm) {
-            let torque = scale.torque_towards_counts(torque);
-            if servo.weight() != torque {
-                rest.end(servo, self.now);
-            }
-            servo.set_arm(torque, inertia);
-        }
     }
 
     /// The supply voltage of the servos at the last call with a time, in 0.1 V. 0 without supply.
