@@ -54,6 +54,7 @@ impl AngleScale {
 
 /// The sine and the cosine of an angle, in millionths.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct SineAndCosine {
     /// The angle in thousandths of a degree.
     millidegrees: i64,
@@ -78,6 +79,7 @@ impl SineAndCosine {
 
 /// The directions of the parts of the arm that have weight.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct JointSines {
     /// The rear arm above the horizontal.
     pub(crate) rear: SineAndCosine,

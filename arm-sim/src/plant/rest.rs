@@ -9,6 +9,7 @@ use crate::servo::units::STEP;
 
 /// The steps of a servo that change nothing, as long as no call changes the servo.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Rest {
     /// The end of the step before the first one.
     since: Instant,
