@@ -138,7 +138,7 @@ impl Rig {
     fn turn(&mut self) -> u64 {
         let now = self.now();
         self.controller.host_bytes(now, &[]);
-        let mut answer = self.plant.poll(now);
+        let mut answer = self.plant.poll(now).to_vec();
         if self.hides_goals {
             hide_goal(&mut answer);
         }
