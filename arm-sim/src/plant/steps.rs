@@ -1,10 +1,11 @@
 //! The steps of the plant: supply, servos, the weight of the arm in its pose, and the room.
 
-use protocol_core::registers::JOINTS;
+use protocol_core::registers::{JOINTS, Joint};
 use protocol_core::time::{Duration, Instant};
 
 use super::rest::Rest;
 use super::{Plant, inertia, weight};
+use crate::servo::Servo;
 use crate::servo::units::STEP;
 
 /// If no call comes for longer than this, the arm stands still during the time before.
@@ -92,5 +93,57 @@ impl Plant {
             }
             servo.set_arm(torque, inertia);
         }
+    }
+
+    /// Ends the rest of all servos.
+    pub(super) fn wake(&mut self) {
+        self.rest_until = self.now;
+        for (servo, rest) in self.servos.iter_mut().zip(&mut self.rests) {
+            rest.end(servo, self.now);
+        }
+    }
+
+    /// A copy of a joint's servo that has counted its steps up to now.
+    pub(super) fn counted(&self, joint: Joint) -> Option<Servo> {
+        let index = usize::from(joint.index());
+        let (mut servo, mut rest) = (self.servos.get(index)?.clone(), *self.rests.get(index)?);
+        rest.end(&mut servo, self.now);
+        Some(servo)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use alloc::string::String;
+
+    use protocol_core::request::Request;
+    use protocol_core::time::Duration;
+
+    use crate::faults::ArmFault;
+    use crate::{Joint, Simulation};
+
+    /// What an arm did that moves among faults, if its servos are woken every `period` milliseconds.
+    fn run(period: u64) -> String {
+        let mut arm = Simulation::default();
+        let faults = ["2=wall=100", "7=push=20", "1=stuck", "4=restarting=700", "supply=dips=900"];
+        for (index, fault) in (0_u16..).zip(faults) {
+            arm.set_fault(fault.parse::<ArmFault>().unwrap(), None);
+            arm.send_request(&Request::Write { address: 46, values: &[120, 95, 70] });
+            for millis in 0..3_000 / u64::from(index + 1) {
+                arm.advance(Duration::from_millis(1));
+                if millis % period == 0 {
+                    arm.plant_mut().wake();
+                }
+            }
+        }
+        let angles = Joint::ALL.map(|joint| arm.plant().angle(joint));
+        alloc::format!("{angles:?} {:?} {:?}", arm.faults(), arm.registers())
+    }
+
+    #[test]
+    fn a_rest_has_the_same_results_as_its_steps() {
+        let together = run(u64::MAX);
+        assert_eq!(together, run(1));
+        assert_eq!(together, run(37));
     }
 }
