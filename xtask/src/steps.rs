@@ -249,12 +249,12 @@ mod tests {
     const STAGES: &[Stage] = &[
         &[&[quick("a", || Ok(()))]],
         &[&[whole("b", || Err("b failed".into())), quick("c", || Ok(()))], &[quick("d", || Ok(()))]],
-        &[&[quick("e", || Ok(()))]],
+        &[&[whole("e", || Ok(())).yielding()], &[quick("f", || Ok(()))]],
     ];
 
-    fn outcome(scope: TestScope) -> (Result<(), String>, Vec<&'static str>) {
+    fn outcome(stages: &[Stage], scope: TestScope) -> (Result<(), String>, Vec<&'static str>) {
         let ran = Mutex::new(Vec::new());
-        let outcome = run(STAGES, scope, |step, output| {
+        let outcome = run(stages, scope, |step, output| {
             ran.lock().unwrap().push(step.heading);
             if let Some(mut output) = output {
                 writeln!(output, "output of {}", step.heading).unwrap();
@@ -266,14 +266,22 @@ mod tests {
 
     #[test]
     fn a_longer_run_includes_the_shorter_one_and_a_failure_ends_it() {
-        let (quick, mut ran) = outcome(TestScope::Quick);
+        let (quick, mut ran) = outcome(STAGES, TestScope::Quick);
         ran.sort_unstable();
-        assert_eq!((quick, ran), (Ok(()), vec!["a", "c", "d", "e"]));
+        assert_eq!((quick, ran), (Ok(()), vec!["a", "c", "d", "f"]));
         for scope in [TestScope::Whole, TestScope::Long] {
-            let (whole, ran) = outcome(scope);
+            let (whole, ran) = outcome(STAGES, scope);
             assert_eq!(whole, Err("step \"b\": b failed".to_owned()));
             assert!(!ran.contains(&"c") && !ran.contains(&"e"), "{ran:?}");
         }
+    }
+
+    #[test]
+    fn all_lanes_of_the_last_stage_run() {
+        let (_, last) = STAGES.split_at(2);
+        let (outcome, mut ran) = outcome(last, TestScope::Whole);
+        ran.sort_unstable();
+        assert_eq!((outcome, ran), (Ok(()), vec!["e", "f"]));
     }
 
     #[test]

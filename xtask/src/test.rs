@@ -87,7 +87,7 @@ const STAGES: &[Stage] = &[
                 system_tests::run_on(&system_tests::ADAPTER)
             }),
             whole("the page in a browser", || {
-                let variables = [("RUST_TEST_THREADS", "2"), ("POSES", "1000")];
+                let variables = [("RUST_TEST_THREADS", "1"), ("POSES", "1000")];
                 run("cargo", &format!("test {TESTED} --test browser"), &variables)
             }),
             whole("the Python package", python::check),

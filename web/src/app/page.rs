@@ -230,8 +230,12 @@ impl App {
                 break;
             }
         }
-        self.preview_on(until);
-        self.class_on(time);
+        if self.time_lines.preview.is_some() {
+            self.preview_on(until);
+        }
+        if self.class.is_some() {
+            self.class_on(time);
+        }
         self.tell_end_of_line();
         self.show();
         self.frames = self.frames.wrapping_add(1);
