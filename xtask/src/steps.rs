@@ -1,9 +1,7 @@
 //! The steps of `cargo xtask test`: their scope, which of them run side by side, and their times.
 
-use std::cell::RefCell;
 use std::fs::File;
 use std::io::{Read, Seek};
-use std::path::Path;
 use std::process::{Command, Stdio};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -30,20 +28,7 @@ pub(crate) enum TestScope {
 pub(crate) struct TestStep {
     heading: &'static str,
     scope: TestScope,
-    /// It gets a processor when nothing else wants it.
-    yields: bool,
     act: fn() -> TaskResult,
-}
-
-impl TestStep {
-    const fn new(heading: &'static str, scope: TestScope, act: fn() -> TaskResult) -> Self {
-        Self { heading, scope, yields: false, act }
-    }
-
-    /// Lets the step yield to those beside it, which depend on time.
-    pub(crate) const fn yielding(self) -> Self {
-        Self { yields: true, ..self }
-    }
 }
 
 /// Steps that run one after the other.
@@ -54,17 +39,17 @@ pub(crate) type Stage = &'static [Lane];
 
 /// A step of every run.
 pub(crate) const fn quick(heading: &'static str, act: fn() -> TaskResult) -> TestStep {
-    TestStep::new(heading, TestScope::Quick, act)
+    TestStep { heading, scope: TestScope::Quick, act }
 }
 
 /// A step of all runs except the quick one.
 pub(crate) const fn whole(heading: &'static str, act: fn() -> TaskResult) -> TestStep {
-    TestStep::new(heading, TestScope::Whole, act)
+    TestStep { heading, scope: TestScope::Whole, act }
 }
 
 /// A step of the long run only.
 pub(crate) const fn long(heading: &'static str, act: fn() -> TaskResult) -> TestStep {
-    TestStep::new(heading, TestScope::Long, act)
+    TestStep { heading, scope: TestScope::Long, act }
 }
 
 /// The work of the step with this heading, which a process of its own does: see [`execute`].
@@ -79,9 +64,7 @@ pub(crate) fn act_of(stages: &[Stage], heading: &str) -> TaskResult {
 pub(crate) fn execute(step: &TestStep, output: Option<File>) -> (Times, TaskResult) {
     let start = Instant::now();
     let outcome = (|| {
-        let program = env::current_exe()?;
-        let mut command = Command::new(if step.yields { Path::new("nice") } else { &program });
-        command.args(step.yields.then_some(&program));
+        let mut command = Command::new(env::current_exe()?);
         command.args(["test", "--step", step.heading]).stdin(Stdio::null());
         if let Some(output) = output {
             command.stdout(output.try_clone()?).stderr(output);
@@ -120,8 +103,18 @@ pub(crate) fn run(
             println!("\n{}", run.table());
         }
         match lanes.as_slice() {
-            [lane] => run.lane(lane, None)?,
-            lanes => run.side_by_side(lanes, number == stages.len())?,
+            [lane] => run.lane(lane, false)?,
+            lanes => thread::scope(|scope| {
+                let running: Vec<_> = lanes
+                    .iter()
+                    .map(|lane| scope.spawn(|| run.lane(lane, true).map_err(|why| why.to_string())))
+                    .collect();
+                // All lanes are waited for, and the first failure is reported.
+                let outcomes: Vec<_> = running.into_iter().map(thread::ScopedJoinHandle::join).collect();
+                outcomes
+                    .into_iter()
+                    .try_for_each(|outcome| outcome.unwrap_or(Err("a thread panicked".to_owned())))
+            })?,
         }
     }
     Ok(())
@@ -135,36 +128,14 @@ struct StepRun<E> {
     execute: E,
 }
 
-impl<E: Fn(&TestStep, Option<File>) -> (Times, TaskResult) + Sync> StepRun<E> {
-    /// Runs lanes side by side. In the last stage their output appears at the end, that of the last lane last.
-    fn side_by_side(&self, lanes: &[Vec<&'static TestStep>], is_last: bool) -> TaskResult {
-        let run = |lane: &[_]| {
-            let kept = RefCell::new(String::new());
-            let show = |text: &str| if is_last { kept.borrow_mut().push_str(text) } else { print!("{text}") };
-            let outcome = self.lane(lane, Some(&show)).map_err(|why| why.to_string());
-            (kept.take(), outcome)
-        };
-        let ended: Vec<_> = thread::scope(|scope| {
-            let running: Vec<_> = lanes.iter().map(|lane| scope.spawn(|| run(lane))).collect();
-            running.into_iter().map(thread::ScopedJoinHandle::join).collect()
-        });
-        // All lanes were waited for, and the first failure is reported.
-        let mut outcome = Ok(());
-        for lane in ended {
-            let (kept, lane_outcome) = lane.map_err(|_| "a thread panicked")?;
-            print!("{kept}");
-            outcome = outcome.and(lane_outcome);
-        }
-        Ok(outcome?)
-    }
-
-    /// Runs the steps of a lane, until one of any lane fails. The output of a step appears at once, or is shown at its end.
-    fn lane(&self, steps: &[&'static TestStep], show: Option<&dyn Fn(&str)>) -> TaskResult {
+impl<E: Fn(&TestStep, Option<File>) -> (Times, TaskResult)> StepRun<E> {
+    /// Runs the steps of a lane, until one of any lane fails.
+    fn lane(&self, steps: &[&'static TestStep], is_beside_others: bool) -> TaskResult {
         for step in steps {
             if self.has_failed.load(Ordering::Relaxed) {
                 break;
             }
-            let outcome = show.map_or_else(|| self.alone(step), |show| self.beside_others(step, show));
+            let outcome = if is_beside_others { self.beside_others(step) } else { self.alone(step) };
             if let Err(why) = outcome {
                 self.has_failed.store(true, Ordering::Relaxed);
                 return Err(format!("step \"{}\": {why}", step.heading).into());
@@ -182,8 +153,8 @@ impl<E: Fn(&TestStep, Option<File>) -> (Times, TaskResult) + Sync> StepRun<E> {
         outcome
     }
 
-    /// Runs a step, and shows its output at its end.
-    fn beside_others(&self, step: &'static TestStep, show: &dyn Fn(&str)) -> TaskResult {
+    /// Runs a step whose output appears at its end, in one piece.
+    fn beside_others(&self, step: &'static TestStep) -> TaskResult {
         let mut output = tempfile::tempfile()?;
         println!("\n... {} begins (after {} s)", step.heading, self.start.elapsed().as_secs());
         let (times, outcome) = (self.execute)(step, Some(output.try_clone()?));
@@ -191,7 +162,7 @@ impl<E: Fn(&TestStep, Option<File>) -> (Times, TaskResult) + Sync> StepRun<E> {
         output.rewind()?;
         output.read_to_end(&mut bytes)?;
         let text = String::from_utf8_lossy(&bytes);
-        show(&format!("\n=== {}\n{text}--- {} took {times}\n", step.heading, step.heading));
+        println!("\n=== {}\n{text}--- {} took {times}", step.heading, step.heading);
         self.complete(step, times);
         outcome
     }
@@ -249,12 +220,12 @@ mod tests {
     const STAGES: &[Stage] = &[
         &[&[quick("a", || Ok(()))]],
         &[&[whole("b", || Err("b failed".into())), quick("c", || Ok(()))], &[quick("d", || Ok(()))]],
-        &[&[whole("e", || Ok(())).yielding()], &[quick("f", || Ok(()))]],
+        &[&[quick("e", || Ok(()))]],
     ];
 
-    fn outcome(stages: &[Stage], scope: TestScope) -> (Result<(), String>, Vec<&'static str>) {
+    fn outcome(scope: TestScope) -> (Result<(), String>, Vec<&'static str>) {
         let ran = Mutex::new(Vec::new());
-        let outcome = run(stages, scope, |step, output| {
+        let outcome = run(STAGES, scope, |step, output| {
             ran.lock().unwrap().push(step.heading);
             if let Some(mut output) = output {
                 writeln!(output, "output of {}", step.heading).unwrap();
@@ -266,22 +237,14 @@ mod tests {
 
     #[test]
     fn a_longer_run_includes_the_shorter_one_and_a_failure_ends_it() {
-        let (quick, mut ran) = outcome(STAGES, TestScope::Quick);
+        let (quick, mut ran) = outcome(TestScope::Quick);
         ran.sort_unstable();
-        assert_eq!((quick, ran), (Ok(()), vec!["a", "c", "d", "f"]));
+        assert_eq!((quick, ran), (Ok(()), vec!["a", "c", "d", "e"]));
         for scope in [TestScope::Whole, TestScope::Long] {
-            let (whole, ran) = outcome(STAGES, scope);
+            let (whole, ran) = outcome(scope);
             assert_eq!(whole, Err("step \"b\": b failed".to_owned()));
             assert!(!ran.contains(&"c") && !ran.contains(&"e"), "{ran:?}");
         }
-    }
-
-    #[test]
-    fn all_lanes_of_the_last_stage_run() {
-        let (_, last) = STAGES.split_at(2);
-        let (outcome, mut ran) = outcome(last, TestScope::Whole);
-        ran.sort_unstable();
-        assert_eq!((outcome, ran), (Ok(()), vec!["e", "f"]));
     }
 
     #[test]

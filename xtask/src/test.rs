@@ -76,7 +76,8 @@ const STAGES: &[Stage] = &[
             whole("start-up of the image", start_up::check),
             whole("recorded sessions, natively and in a WebAssembly module", replays::short),
             whole("instructions are within their budgets", || count::check(false)),
-            whole("worlds with injected faults", torture::short).yielding(),
+            whole("worlds with injected faults", torture::short),
+            whole("fuzzing", fuzz::fixed),
         ],
         // beside what mostly waits for an arm, a browser or a network.
         &[
@@ -117,13 +118,10 @@ const STAGES: &[Stage] = &[
         }),
         quick("tests of the tasks", || cargo("test --package xtask")),
     ]],
-    &[
-        &[whole("fuzzing", fuzz::fixed).yielding()],
-        &[quick("tests, and the system tests on the simulator", || {
-            // More threads than processors, because most system tests wait for an arm.
-            run("cargo", &format!("test {TESTED}"), &[("RUST_TEST_THREADS", "8")])
-        })],
-    ],
+    &[&[quick("tests, and the system tests on the simulator", || {
+        // More threads than processors, because most system tests wait for an arm.
+        run("cargo", &format!("test {TESTED}"), &[("RUST_TEST_THREADS", "8")])
+    })]],
 ];
 
 /// Runs the steps, or does the work of one of them.
