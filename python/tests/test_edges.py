@@ -68,19 +68,26 @@ def test_a_watchdog_is_never_rounded_to_none(simulated_arm: sevenbot.Arm, watchd
         assert simulated_arm.get("watchdog") == 0
 
 
-FORK = """
-import os, signal, sevenbot
-arm = sevenbot.Arm.simulated()
-child = os.fork()
-if child == 0:
-    signal.alarm(60)
-    for call in [lambda: arm.get("speed"), lambda: arm.angles, arm.stop, lambda: arm.simulation.now]:
+# What the scripts that fork begin with.
+FORKED = """
+import os, signal, threading, time, sevenbot
+
+def check_refused(*calls):
+    for call in calls:
         try:
             call()
             os._exit(1)
         except sevenbot.Closed as error:
             if "forked" not in str(error):
                 os._exit(2)
+"""
+
+FORK = FORKED + """
+arm = sevenbot.Arm.simulated()
+child = os.fork()
+if child == 0:
+    signal.alarm(60)
+    check_refused(lambda: arm.get("speed"), lambda: arm.angles, arm.stop, lambda: arm.simulation.now)
     arm.close()
     with arm:
         pass
@@ -98,27 +105,25 @@ def test_a_forked_process_is_told_so() -> None:
     assert in_a_process(FORK).split()[0] == "0"
 
 
-FORK_OF_MANY = """
-import os, signal, threading, time, sevenbot
+FORK_OF_MANY = FORKED + """
 arms = sevenbot.SimulatedArms(2000, threads=2)
 snapshot = arms.snapshot(0)
-steps = threading.Thread(target=arms.step, args=(None, 1.0))
+is_over = threading.Event()
+
+def make_steps():
+    while not is_over.is_set():
+        arms.step(None, 1.0)
+
+steps = threading.Thread(target=make_steps)
 steps.start()
 time.sleep(0.05)
 child = os.fork()
 if child == 0:
     signal.alarm(60)
-    calls = [
+    check_refused(
         lambda: arms.step(None), arms.read, arms.observe, arms.reset, arms.clear, lambda: arms.snapshot(0),
         lambda: arms.set("speed", 50), lambda: arms.set_load(10), lambda: arms.scale_servos(1, 1),
-    ]
-    for call in calls:
-        try:
-            call()
-            os._exit(1)
-        except sevenbot.Closed as error:
-            if "forked" not in str(error):
-                os._exit(2)
+    )
     if hasattr(arms, "angles") or hasattr(arms, "time") or len(arms) != 2000:
         os._exit(3)
     own = sevenbot.SimulatedArms(2, threads=2)
@@ -126,7 +131,7 @@ if child == 0:
     own.step(None)
     del arms
     os._exit(0)
-assert steps.is_alive(), "the step has to last longer than the fork"
+is_over.set()
 print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
 steps.join()
 print(len(arms.read()))
