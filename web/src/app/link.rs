@@ -11,7 +11,7 @@ use super::page::{App, with_app};
 /// How the part of an address begins that holds a program.
 const FRAGMENT: &str = "#program=";
 
-/// Shows the program of the address, if it has one, now and when the address changes.
+/// Shows the program of the address when the address changes.
 pub(super) fn listen() -> Result<(), JsValue> {
     let window = web_sys::window().ok_or("no window")?;
     let changed = Closure::<dyn FnMut(Event)>::new(|_| {

@@ -230,6 +230,7 @@ impl App {
                 break;
             }
         }
+        // Asked here, because a call of either would load the rest of the module (`super::rest`) for the first picture.
         if self.time_lines.preview.is_some() {
             self.preview_on(until);
         }

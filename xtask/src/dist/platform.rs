@@ -60,7 +60,7 @@ impl Platform {
         add_target(self.triple)?;
         let mut command = match self.debian {
             Some(_) => {
-                let mut zigbuild = tools::cargo_with_zig("zigbuild")?;
+                let mut zigbuild = tools::zigbuild()?;
                 zigbuild.args(["--package", "host-sim"]);
                 zigbuild.args(["--target", &format!("{}.{GLIBC}", self.triple)]);
                 self.use_zig(&mut zigbuild)?;

@@ -33,10 +33,10 @@ pub(super) fn search_path() -> TaskResult<OsString> {
     Ok(env::join_paths(folders)?)
 }
 
-/// A command of cargo for which zig compiles C code, and links: `zigbuild`, `clippy`.
-pub(super) fn cargo_with_zig(subcommand: &str) -> TaskResult<Command> {
+/// `cargo zigbuild`: zig compiles C code, and links.
+pub(super) fn zigbuild() -> TaskResult<Command> {
     let mut command = Command::new(python()?.with_file_name("cargo-zigbuild"));
-    command.arg(subcommand).env("PATH", search_path()?);
+    command.arg("zigbuild").env("PATH", search_path()?);
     Ok(command)
 }
 

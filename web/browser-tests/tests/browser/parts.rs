@@ -30,12 +30,16 @@ fn the_first_view_shows_moves_and_stops_the_arm_without_the_rest() {
     }
 }
 
+fn open_exercises(page: &mut Page) {
+    page.click("[data-action=exercises]");
+    page.wait_for_text("#exercise-text", "Joint 1");
+}
+
 #[test]
 fn what_needs_the_rest_loads_it_at_once() {
     let viewed = Viewed::without_arm();
     let mut page = viewed.open_after(WITHOUT_REST);
-    page.click("[data-action=exercises]");
-    page.wait_for_text("#exercise-text", "Joint 1");
+    open_exercises(&mut page);
     page.click("[data-action=hint]");
     assert_eq!(requests_of_rest(&mut page), 1);
     assert_eq!(page.errors(), [""; 0]);
@@ -46,7 +50,6 @@ fn the_rest_is_loaded_after_the_first_picture() {
     let viewed = Viewed::without_arm();
     let mut page = viewed.open();
     wait_until("the rest is asked for", || requests_of_rest(&mut page) > 0);
-    page.click("[data-action=exercises]");
-    page.wait_for_text("#exercise-text", "Joint 1");
+    open_exercises(&mut page);
     assert_eq!(page.errors(), [""; 0]);
 }
