@@ -9,7 +9,7 @@ use std::time::Instant;
 use std::{env, thread};
 
 use crate::run::TaskResult;
-use crate::times::Times;
+use crate::times::{self, Times};
 use torture::text_table::Column::{Left, Right};
 use torture::text_table::TextTable;
 
@@ -56,7 +56,10 @@ pub(crate) const fn long(heading: &'static str, act: fn() -> TaskResult) -> Test
 pub(crate) fn act_of(stages: &[Stage], heading: &str) -> TaskResult {
     let mut steps = stages.iter().copied().flatten().copied().flatten();
     let step = steps.find(|step| step.heading == heading).ok_or("there is no such step")?;
-    (step.act)()
+    times::adopt_orphans()?;
+    let outcome = (step.act)();
+    times::wait_for_orphans();
+    outcome
 }
 
 /// Runs a step in a process of its own, because its output can only be kept apart there, and its processor time measured.

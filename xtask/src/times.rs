@@ -3,14 +3,18 @@
 use std::fmt::{self, Display};
 use std::fs;
 use std::process::Child;
+use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use rustix::process::{Pid, WaitId, WaitIdOptions, waitid};
+use rustix::process::{Pid, WaitId, WaitIdOptions, WaitOptions, waitid};
 
 use crate::run::TaskResult;
 
 /// The length of a tick in /proc: 1/100 s on every Linux (USER_HZ).
 const TICK: Duration = Duration::from_millis(10);
+
+/// How long the processes of a step may outlive it.
+const PATIENCE: Duration = Duration::from_secs(10);
 
 /// The times of a child process with its own children.
 #[derive(Clone, Copy)]
@@ -44,6 +48,31 @@ impl Times {
             self.processor.map_or("?".to_owned(), |processor| format!("{:.1}", processor.as_secs_f64()));
         [format!("{:.0}", self.elapsed.as_secs_f64()), processor]
     }
+}
+
+/// Makes this process the parent of descendants that lose theirs, such as those of a browser: [`wait_for_orphans`] counts them.
+#[cfg(target_os = "linux")]
+pub(crate) fn adopt_orphans() -> TaskResult {
+    Ok(rustix::process::set_child_subreaper(Some(rustix::process::getpid()))?)
+}
+
+/// As on Linux, where the system has nothing like it.
+#[cfg(not(target_os = "linux"))]
+pub(crate) fn adopt_orphans() -> TaskResult {
+    Ok(())
+}
+
+/// Waits for the end of all processes that this one has started or adopted, but not for long.
+pub(crate) fn wait_for_orphans() {
+    let deadline = Instant::now() + PATIENCE;
+    while Instant::now() < deadline {
+        match rustix::process::wait(WaitOptions::NOHANG) {
+            Ok(Some(_)) => {}
+            Ok(None) => sleep(TICK),
+            Err(_) => return,
+        }
+    }
+    println!("processes that this step has started still run");
 }
 
 /// The processor time of this process so far.

@@ -1,11 +1,9 @@
 //! Debian's Chromium, with software rendering and no way to other computers.
 
-use std::process::{Command, Stdio};
+use std::process::{Child, Command, Stdio};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use serde_json::{Value, json};
-use system_tests::process::RunningProgram;
-use tempfile::TempDir;
 
 use crate::connection::{Connection, line_after};
 
@@ -53,31 +51,59 @@ const KEPT: [&str; 5] = [
     "Log.entryAdded",
 ];
 
-/// One browser at a time: it renders in software, and uses all processors.
-static TURN: Mutex<()> = Mutex::new(());
+/// Starts the browser with a new profile, and ends it when the standard input ends: with the process of the tests, however that ends.
+const RUN: &str = r#"
+    profile=$(mktemp -d)
+    chromium --user-data-dir="$profile" "$@" &
+    read -r _
+    kill $!
+    wait
+    rm -r "$profile""#;
 
-/// A running browser with a profile of its own.
+/// The browser of this process, which is started for the first test. It renders in software and uses all processors, so one test at
+/// a time has it.
+static BROWSER: Mutex<Option<Chromium>> = Mutex::new(None);
+
+/// A running browser.
 #[derive(Debug)]
-pub struct Chromium {
+struct Chromium {
     /// Where its DevTools listen, without `ws://`.
     address: String,
-    _process: RunningProgram,
-    _profile: TempDir,
-    _turn: MutexGuard<'static, ()>,
+    /// The shell, with its standard input.
+    _process: Child,
 }
 
 impl Chromium {
-    /// Starts a browser, which has no window.
-    #[must_use]
-    pub fn start() -> Self {
-        let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
-        let profile = tempfile::tempdir().expect("a temporary folder");
-        let mut command = Command::new("chromium");
-        command.args(OPTIONS).arg(format!("--user-data-dir={}", profile.path().display()));
-        command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped());
-        let mut process = RunningProgram::spawn(&mut command);
+    fn start() -> Self {
+        let mut command = Command::new("sh");
+        command.args(["-c", RUN, "sh"]).args(OPTIONS).stdin(Stdio::piped());
+        let mut process = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("a shell");
         let address = line_after("DevTools listening on ws://", process.stderr.take());
-        Self { address, _process: process, _profile: profile, _turn: turn }
+        Self { address, _process: process }
+    }
+}
+
+/// The browser as a test has it: without windows, files and stored values of other tests.
+#[derive(Debug)]
+pub struct BrowserContext {
+    address: String,
+    /// Its identifier in the DevTools protocol.
+    pub id: Value,
+    // In this order: its windows are closed before another test has the browser.
+    _lasts_as_long_as: Connection,
+    _turn: MutexGuard<'static, Option<Chromium>>,
+}
+
+impl BrowserContext {
+    /// Waits until no other test has the browser.
+    #[must_use]
+    pub fn open() -> Self {
+        let mut turn = BROWSER.lock().unwrap_or_else(PoisonError::into_inner);
+        let address = turn.get_or_insert_with(Chromium::start).address.clone();
+        let mut connection = Connection::open(&address, |_| false);
+        let mut context = connection.call("Target.createBrowserContext", json!({ "disposeOnDetach": true }));
+        let id = context["browserContextId"].take();
+        Self { address, id, _lasts_as_long_as: connection, _turn: turn }
     }
 
     /// Opens an empty page in a window of its own, so that it is not in the background.
@@ -85,7 +111,8 @@ impl Chromium {
     pub fn open_page(&self) -> Connection {
         let is_kept = |event: &Value| KEPT.iter().any(|method| event["method"] == *method);
         let mut page = Connection::open(&self.address, is_kept);
-        let target = page.call("Target.createTarget", json!({ "url": "about:blank", "newWindow": true }));
+        let window = json!({ "url": "about:blank", "newWindow": true, "browserContextId": self.id });
+        let target = page.call("Target.createTarget", window);
         let attach = json!({ "targetId": target["targetId"], "flatten": true });
         let session = page.call("Target.attachToTarget", attach);
         page.session = session["sessionId"].as_str().map(str::to_owned);

@@ -160,7 +160,8 @@ impl Page {
 
     /// Lets downloads go to a folder.
     pub fn download_to(&mut self, folder: &Path) {
-        let behaviour = json!({ "behavior": "allow", "downloadPath": folder });
+        let behaviour =
+            json!({ "behavior": "allow", "downloadPath": folder, "browserContextId": self.browser.id });
         self.call("Browser.setDownloadBehavior", behaviour);
     }
 

@@ -7,7 +7,7 @@ use base64::engine::general_purpose::STANDARD;
 use serde_json::{Value, json};
 use system_tests::wait::{wait_for, wait_until};
 
-use crate::browser::Chromium;
+use crate::browser::BrowserContext;
 use crate::connection::{Connection, variable};
 use crate::picture::Picture;
 
@@ -30,7 +30,7 @@ const KEEP_TEXTS: &str = "
 #[derive(Debug)]
 pub struct Page {
     connection: Connection,
-    browser: Rc<Chromium>,
+    pub(crate) browser: Rc<BrowserContext>,
     /// The number of kept texts up to the last one that the test waited for.
     heard: usize,
 }
@@ -65,7 +65,7 @@ impl Page {
     /// As [`Self::open`]. `script` runs before the scripts of the page.
     #[must_use]
     pub fn open_after(url: &str, script: &str) -> Self {
-        Self::open_in(Rc::new(Chromium::start()), url, script)
+        Self::open_in(Rc::new(BrowserContext::open()), url, script)
     }
 
     /// Opens an address in another window of the same browser. `script` runs before the scripts of the page.
@@ -74,7 +74,7 @@ impl Page {
         Self::open_in(Rc::clone(&self.browser), url, script)
     }
 
-    fn open_in(browser: Rc<Chromium>, url: &str, script: &str) -> Self {
+    fn open_in(browser: Rc<BrowserContext>, url: &str, script: &str) -> Self {
         let mut page = Self { connection: browser.open_page(), browser, heard: 0 };
         for domain in ["Page", "Log", "Network", "Runtime"] {
             page.call(&format!("{domain}.enable"), json!({}));

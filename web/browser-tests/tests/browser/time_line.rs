@@ -37,6 +37,8 @@ fn a_recording_is_looked_through_and_nothing_moves() {
     page.choose_file("#upload", &file);
     page.wait_for_text("#recording", "recorded: ");
     page.wait_until_ready();
+    // The arm has settled under its weight.
+    page.pass(1.0);
     let before = page.measured();
     page.click("[data-action=look]");
     page.wait_for_text("#moment-text", "0.0 / 4.0 s · 90° 115°");
