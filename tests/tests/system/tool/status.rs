@@ -189,7 +189,7 @@ fn d29_a_lost_supply_is_told_and_recover_asks_before_the_motors_go_on() {
 }
 
 #[test]
-fn a_parked_arm_stays_and_its_own_pose_is_kept() {
+fn a_parked_arm_stays_and_one_that_sinks_is_told() {
     let rig = Rig::start();
     let text = failed(&rig.run(&["park", "_", "90", "65", "90", "90", "_", "_", "--keep"]), 1);
     assert!(text.contains("joint 3 sinks"), "a level forearm is no park pose: {text}");
@@ -197,10 +197,16 @@ fn a_parked_arm_stays_and_its_own_pose_is_kept() {
     let first = succeeded(rig.run(&["park"]));
     assert!(first.starts_with("90.00 90.00 0."), "{first}");
     assert!(succeeded(rig.run(&["status"])).starts_with("motors damping protection"));
-    succeeded(rig.run(&["state", "servo"]));
-    // The example of `park --help`.
-    succeeded(rig.run(&["park", "_", "95", "0", "_", "50", "_", "_", "--keep"]));
-    succeeded(rig.run(&["state", "servo"]));
+}
+
+#[test]
+fn the_pose_in_the_help_of_park_is_one() {
+    succeeded(Rig::start().run(&["park", "_", "95", "0", "_", "50", "_", "_", "--keep"]));
+}
+
+#[test]
+fn an_own_pose_to_park_is_kept() {
+    let rig = Rig::start();
     succeeded(rig.run(&["park", "100", "95", "0", "90", "50", "_", "_", "--keep"]));
     succeeded(rig.run(&["state", "servo"]));
     let kept = succeeded(rig.run(&["park"]));
