@@ -95,11 +95,21 @@ impl Arm {
     }
 
     fn restore_period(&mut self, before: &Snapshot) -> Result<(), WriteError> {
-        let watchdog = |registers: &Snapshot| registers.byte(&HOST_WATCHDOG);
-        if watchdog(&self.read_span(PERIOD_AND_WATCHDOG)?) != watchdog(before) {
+        if self.is_stream_over(before)? {
             return Ok(());
         }
-        self.write_checked(SET_POINT_PERIOD.address, &before.word(SET_POINT_PERIOD.address).to_le_bytes())
+        self.write_checked(SET_POINT_PERIOD.address, &before.word(SET_POINT_PERIOD.address).to_le_bytes())?;
+        // It may have ended between that read and the write.
+        if self.is_stream_over(before)? {
+            self.write_checked(SET_POINT_PERIOD.address, &[0, 0])?;
+        }
+        Ok(())
+    }
+
+    /// True if the program that streamed has changed its watchdog since `before`.
+    fn is_stream_over(&mut self, before: &Snapshot) -> Result<bool, WriteError> {
+        let watchdog = |registers: &Snapshot| registers.byte(&HOST_WATCHDOG);
+        Ok(watchdog(&self.read_span(PERIOD_AND_WATCHDOG)?) != watchdog(before))
     }
 }
 

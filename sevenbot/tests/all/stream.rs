@@ -130,21 +130,34 @@ fn the_period_of_another_program_is_put_back_after_a_failure() {
     assert_eq!(shown.lock().unwrap()[184..186], [20, 0]);
 }
 
+/// The first write before which the program that streams ends its stream.
+#[derive(Clone, Copy)]
+enum StreamEnd {
+    Never,
+    Stop,
+    RestoredPeriod,
+}
+
 #[test]
 fn d23_a_stop_leaves_a_stream_off_that_its_program_has_ended_meanwhile() {
-    for (program_ends, left) in [(false, [20, 0, 30, 0]), (true, [0; 4])] {
+    let ends =
+        [(StreamEnd::Never, [20, 0, 30, 0]), (StreamEnd::Stop, [0; 4]), (StreamEnd::RestoredPeriod, [0; 4])];
+    for (end, left) in ends {
         let registers = moving_registers();
         registers.lock().unwrap()[191] = 1;
         registers.lock().unwrap()[184..188].copy_from_slice(&[20, 0, 30, 0]);
         let shown = Arc::clone(&registers);
         let (port, _held) = scripted_arm(move |_, request| {
             let mut registers = registers.lock().unwrap();
-            let answer = execute(&mut registers, request);
-            let is_stop = matches!(request, Request::Write { address: 128..142, .. });
-            if is_stop && program_ends {
+            let is_end = match (end, &request) {
+                (StreamEnd::Stop, Request::Write { address, .. }) => (128..142).contains(address),
+                (StreamEnd::RestoredPeriod, Request::Write { address: 184, values }) => values[0] == 20,
+                _ => false,
+            };
+            if is_end {
                 registers[184..188].fill(0);
             }
-            answer
+            execute(&mut registers, request)
         });
         let mut arm = Arm::open(&port, 115_200).unwrap();
         arm.hold().unwrap();
