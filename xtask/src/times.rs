@@ -56,7 +56,7 @@ pub(crate) fn adopt_orphans() -> TaskResult {
     Ok(rustix::process::set_child_subreaper(Some(rustix::process::getpid()))?)
 }
 
-/// As on Linux, where the system has nothing like it.
+/// Other systems have nothing like it.
 #[cfg(not(target_os = "linux"))]
 pub(crate) fn adopt_orphans() -> TaskResult {
     Ok(())
