@@ -6,7 +6,7 @@ const REST = new URL("rest.wasm", import.meta.url);
 const first = await init({ module_or_path: new URL("sevenbot_web_bg.wasm", import.meta.url) });
 let isRestThere = false;
 
-// Both ways of loading may end here.
+// The request that blocks may be quicker than the other one, which then changes nothing.
 function enter(module) {
   if (!isRestThere) new WebAssembly.Instance(module, { first });
   isRestThere = true;

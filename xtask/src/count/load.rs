@@ -1,5 +1,5 @@
-//! The load of the chip while a program streams points and gets reports: the instructions of a second, of
-//! which a part is counted.
+//! The load of the chip while a program streams points and gets reports: the instructions of a second.
+//! A part of it is counted.
 //!
 //! ```text
 //!   200 frames a second of seven fine targets ──▶ image ──▶ 50 reports a second of content 2
@@ -40,9 +40,6 @@ const STEP: u16 = 30;
 /// transmitter is always empty, so that one interrupt sends up to eight bytes.
 const PER_BYTE_SENT: u64 = 59 + 38;
 
-/// Reports in the counted time.
-const REPORTS: usize = 10;
-
 /// On a busy computer the image may miss ticks, and then it does less.
 const ATTEMPTS: usize = 4;
 
@@ -51,7 +48,7 @@ pub(super) fn figure() -> TaskResult<Figure> {
     for _ in 0..ATTEMPTS {
         let (steps, reported) = count()?;
         // The first and the last report may be cut.
-        if reported / REPORT_BYTES >= REPORTS - 1 {
+        if (reported / REPORT_BYTES) as u64 >= u64::from(REPORT_HZ) / PARTS - 1 {
             let what = "image: one second of 200 frames of 7 fine targets and 50 long reports";
             return Ok(Figure::new(what, PARTS * steps));
         }

@@ -256,7 +256,7 @@ fn a_program_is_kept_over_a_reload_saved_and_opened_by_a_link() {
     open_programs(&mut page);
     page.wait_for_text("#python", &python);
 
-    // The browser is one test's at a time.
+    // The next page waits until this one is closed.
     drop(page);
     let mut other = Page::open(&link);
     other.key("Escape");
