@@ -2,7 +2,11 @@
 
 use crc::{CRC_16_MODBUS, Crc};
 
+use crate::registers::TARGET_POSITION;
+
 const MODBUS: Crc<u16> = Crc::<u16>::new(&CRC_16_MODBUS);
+/// First and last register of the fine targets.
+const FINE_TARGETS: (u8, u8) = (128, 141);
 
 /// The bytes, followed by their checksum, low byte first.
 #[must_use]
@@ -36,16 +40,64 @@ pub fn reply(address: u8, values: &[u8]) -> Vec<u8> {
     with_checksum(&frame)
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+/// Does the frame write a target?
+#[must_use]
+pub fn is_target(frame: &[u8]) -> bool {
+    let &[_, _, 0x06, address, count, ..] = frame else { return false };
+    let Some(last) = count.checked_sub(1).map(|more| address.saturating_add(more)) else { return false };
+    let holds = |(from, to): (u8, u8)| address <= to && last >= from;
+    holds((TARGET_POSITION, TARGET_POSITION + 6)) || holds(FINE_TARGETS)
+}
 
-    #[test]
-    fn frames_equal_the_documented_examples() {
-        assert_eq!(read_request(54, 7), [0xaa, 0x77, 0x03, 0x36, 0x07, 0x81, 0xce]);
-        assert_eq!(write_request(28, &[0]), [0xaa, 0x77, 0x06, 0x1c, 0x01, 0x00, 0x2c, 0xc4]);
-        let positions = [90, 90, 65, 90, 90, 90, 80];
-        let documented = [0xaa, 0x77, 0x03, 0x36, 0x07, 0x5a, 0x5a, 0x41, 0x5a, 0x5a, 0x5a, 0x50, 0x43, 0x81];
-        assert_eq!(reply(54, &positions), documented);
+/// Cuts bytes into frames. Bytes outside frames are passed on as they are.
+#[derive(Debug)]
+pub struct FrameSplitter {
+    bytes: Vec<u8>,
+    is_of_arm: bool,
+    count: u32,
+}
+
+impl FrameSplitter {
+    /// For the bytes of an arm, or else those of a program.
+    #[must_use]
+    pub const fn new(is_of_arm: bool) -> Self {
+        Self { bytes: Vec::new(), is_of_arm, count: 0 }
+    }
+
+    /// Adds bytes that have come.
+    pub fn push(&mut self, bytes: &[u8]) {
+        self.bytes.extend(bytes);
+    }
+
+    /// Frames so far.
+    #[must_use]
+    pub const fn count(&self) -> u32 {
+        self.count
+    }
+
+    /// The next frame, or bytes outside of one. `None` if there is no whole frame.
+    #[expect(clippy::should_implement_trait, reason = "more bytes may come after a `None`")]
+    pub fn next(&mut self) -> Option<Vec<u8>> {
+        let length = match self.bytes.as_slice() {
+            [0xAA, 0x77, function, _, count, ..] => {
+                self.count += u32::from(self.bytes.len() >= self.length(*function, *count));
+                self.length(*function, *count)
+            }
+            [] | [0xAA] | [0xAA, 0x77, ..] => return None,
+            [0xAA, ..] => 1,
+            other => other.iter().position(|&byte| byte == 0xAA).unwrap_or(other.len()),
+        };
+        (self.bytes.len() >= length).then(|| self.bytes.drain(..length).collect())
+    }
+
+    /// The length of a frame, with its checksum.
+    fn length(&self, function: u8, count: u8) -> usize {
+        let has_values = match function {
+            0x03 | 0x05 => self.is_of_arm,
+            // An alarm has no count.
+            0x08 => false,
+            _ => true,
+        };
+        7 + if has_values { usize::from(count) } else { 0 }
     }
 }

@@ -25,19 +25,3 @@ impl Random {
         self.bits() % limit
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_seed_gives_the_same_numbers_again() {
-        let numbers = |seed| {
-            let mut random = Random::new(seed);
-            [random.bits(), random.below(10), random.below(10)]
-        };
-        assert_eq!(numbers(7), numbers(7));
-        assert_ne!(numbers(7), numbers(8));
-        assert_eq!(Random::new(0).bits(), 0xE220_A839_7B1D_CDAF, "the published first number");
-    }
-}

@@ -21,13 +21,11 @@ use rustix::io::Errno;
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 
-use crate::registers::TARGET_POSITION;
+use crate::frames::{FrameSplitter, is_target};
 use crate::wait::wait_for;
 
 /// The longest time until the relay notices its end, in nanoseconds.
 const POLL_NANOS: i64 = 20_000_000;
-/// First and last register of the fine targets.
-const FINE_TARGETS: (u8, u8) = (128, 141);
 
 /// A frame on the line. The action comes before the frame is passed on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -187,7 +185,7 @@ impl Line {
         let _ = poll(&mut ends, Some(&timeout));
         let [has_requests, has_replies] = ends.map(|end| end.revents().contains(PollFlags::IN));
         if has_requests {
-            self.requests.read(&self.program);
+            read(&self.program, &mut self.requests);
         }
         while let Some(frame) = self.requests.next() {
             if self.pass_request(frame) == LineAction::Unplug {
@@ -195,7 +193,7 @@ impl Line {
             }
         }
         if has_replies {
-            self.replies.read(&self.arm);
+            read(&self.arm, &mut self.replies);
         }
         while let Some(frame) = self.replies.next() {
             if self.pass_reply(frame) == LineAction::Unplug {
@@ -208,7 +206,7 @@ impl Line {
     fn pass_request(&mut self, mut frame: Vec<u8>) -> LineAction {
         self.after_target = self.after_target.map(|count| count + 1);
         let moment = self.plan.moment;
-        let is_due = moment == Moment::Request(self.requests.count)
+        let is_due = moment == Moment::Request(self.requests.count())
             || self.after_target.is_some_and(|count| moment == Moment::AfterTarget(count));
         if is_target(&frame) {
             self.after_target.get_or_insert(0);
@@ -217,7 +215,7 @@ impl Line {
             return LineAction::Unplug;
         }
         if self.plan.is_noisy {
-            disturb(&mut frame, self.requests.count, 9);
+            disturb(&mut frame, self.requests.count(), 9);
         }
         (self.watch)(Passing::Request(&frame));
         pass_on(&self.arm, &frame);
@@ -225,7 +223,7 @@ impl Line {
     }
 
     fn pass_reply(&mut self, mut frame: Vec<u8>) -> LineAction {
-        if self.plan.moment == Moment::Reply(self.replies.count) && self.act() == LineAction::Unplug {
+        if self.plan.moment == Moment::Reply(self.replies.count()) && self.act() == LineAction::Unplug {
             return LineAction::Unplug;
         }
         if self.plan.is_noisy {
@@ -245,6 +243,13 @@ impl Line {
         let is_first = !std::mem::replace(&mut self.has_acted, true);
         if is_first { (self.plan.action)() } else { LineAction::Nothing }
     }
+}
+
+/// Takes the bytes that have come.
+fn read(source: &OwnedFd, splitter: &mut FrameSplitter) {
+    let mut chunk = [0; 4096];
+    let length = rustix::io::read(source, &mut chunk).unwrap_or(0);
+    splitter.push(&chunk[..length]);
 }
 
 /// Writes a frame. An arm that takes no bytes for a second, or is gone, is a fault that a test wants.
@@ -277,89 +282,4 @@ fn disturb(frame: &mut [u8], number: u32, each: u32) {
 /// Is the frame of the arm a report, and probably no answer?
 fn is_report(frame: &[u8]) -> bool {
     matches!(frame, [_, _, 0x03, 142, 14 | 42, ..])
-}
-
-/// Does the frame write a target?
-fn is_target(frame: &[u8]) -> bool {
-    let &[_, _, 0x06, address, count, ..] = frame else { return false };
-    let Some(last) = count.checked_sub(1).map(|more| address.saturating_add(more)) else { return false };
-    let holds = |(from, to): (u8, u8)| address <= to && last >= from;
-    holds((TARGET_POSITION, TARGET_POSITION + 6)) || holds(FINE_TARGETS)
-}
-
-/// Cuts bytes into frames. Bytes outside frames are passed on as they are.
-struct FrameSplitter {
-    bytes: Vec<u8>,
-    is_of_arm: bool,
-    /// Frames so far.
-    count: u32,
-}
-
-impl FrameSplitter {
-    const fn new(is_of_arm: bool) -> Self {
-        Self { bytes: Vec::new(), is_of_arm, count: 0 }
-    }
-
-    /// Takes the bytes that have come.
-    fn read(&mut self, source: &OwnedFd) {
-        let mut chunk = [0; 4096];
-        let length = rustix::io::read(source, &mut chunk).unwrap_or(0);
-        self.bytes.extend(&chunk[..length]);
-    }
-
-    /// The next frame, or bytes outside of one. `None` if there is no whole frame.
-    fn next(&mut self) -> Option<Vec<u8>> {
-        let length = match self.bytes.as_slice() {
-            [0xAA, 0x77, function, _, count, ..] => {
-                self.count += u32::from(self.bytes.len() >= self.length(*function, *count));
-                self.length(*function, *count)
-            }
-            [] | [0xAA] | [0xAA, 0x77, ..] => return None,
-            [0xAA, ..] => 1,
-            other => other.iter().position(|&byte| byte == 0xAA).unwrap_or(other.len()),
-        };
-        (self.bytes.len() >= length).then(|| self.bytes.drain(..length).collect())
-    }
-
-    /// The length of a frame, with its checksum.
-    fn length(&self, function: u8, count: u8) -> usize {
-        let has_values = match function {
-            0x03 | 0x05 => self.is_of_arm,
-            // An alarm has no count.
-            0x08 => false,
-            _ => true,
-        };
-        7 + if has_values { usize::from(count) } else { 0 }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::frames::{read_request, reply, write_request};
-
-    fn frames(is_of_arm: bool, bytes: &[u8]) -> (Vec<Vec<u8>>, u32) {
-        let mut splitter = FrameSplitter::new(is_of_arm);
-        let mut found = Vec::new();
-        for &byte in bytes {
-            splitter.bytes.push(byte);
-            found.extend(splitter.next());
-        }
-        (found, splitter.count)
-    }
-
-    #[test]
-    fn frames_are_cut_and_counted() {
-        let requests = [read_request(54, 7), write_request(46, &[90; 7]), read_request(0, 8)];
-        assert_eq!(frames(false, &requests.concat()), (requests.to_vec(), 3));
-        let replies = [reply(54, &[90; 7]), vec![0x20], reply(0, &[7; 8])];
-        assert_eq!(frames(true, &replies.concat()), (replies.to_vec(), 2), "text between frames");
-    }
-
-    #[test]
-    fn a_target_is_seen_in_any_write_that_holds_one() {
-        assert!(is_target(&write_request(46, &[1])) && is_target(&write_request(29, &[1; 30])));
-        assert!(is_target(&write_request(140, &[1, 0])) && !is_target(&write_request(128, &[])));
-        assert!(!is_target(&write_request(32, &[1; 7])) && !is_target(&read_request(46, 7)));
-    }
 }

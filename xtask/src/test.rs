@@ -118,16 +118,42 @@ const STAGES: &[Stage] = &[
         }),
         quick("tests of the tasks", || cargo("test --package xtask")),
     ]],
-    &[&[quick("tests, and the system tests on the simulator", || {
-        // More threads than processors, because most system tests wait for an arm.
-        run("cargo", &format!("test {TESTED}"), &[("RUST_TEST_THREADS", "8")])
-    })]],
+    &[
+        &[quick("unit and property tests, and examples of the documentation", || {
+            test("--exclude system-tests")
+        })],
+        &[quick("system tests, the simulator", || test("--test system"))],
+    ],
+    &[&[quick("every command with every fault of the simulator", || test("--test faults"))]],
 ];
+
+/// Runs these tests, with more threads than processors, because most of those with an arm wait for it.
+fn test(which: &str) -> TaskResult {
+    run("cargo", &format!("test {TESTED} {which}"), &[("RUST_TEST_THREADS", "8")])
+}
 
 /// Runs the steps, or does the work of one of them.
 pub(crate) fn run_steps(options: &TestArgs) -> TaskResult {
     match &options.step {
         Some(heading) => steps::act_of(STAGES, heading),
         None => steps::run(STAGES, options.scope(), steps::execute),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use crate::run::root;
+
+    #[test]
+    fn each_file_of_the_system_tests_has_a_step() {
+        let mut files: Vec<_> = fs::read_dir(root().join("tests/tests"))
+            .unwrap()
+            .flatten()
+            .map(|file| file.file_name())
+            .collect();
+        files.sort_unstable();
+        assert_eq!(files, ["faults", "system"]);
     }
 }

@@ -4,4 +4,5 @@
 mod device;
 mod serve;
 mod simulator;
+mod support;
 mod tool;
