@@ -27,8 +27,8 @@ TOLERANCE = 0.5
 ENOUGH = 120.0
 #: Seconds. On a busy machine an answer of the emulator may take longer than a program waits by itself.
 ANSWER_TIME = 20.0
-#: What happens on a machine that is too busy for an emulator: the arm stops on its way, or a servo's answers are late.
-BUSY = ("this program paused", "does not answer")
+#: What happens on a machine that is too busy for an emulator: the arm stops on its way, or the answers of servos are late.
+BUSY = ("this program paused", "does not answer", "no servo answers")
 #: How often a program is begun anew then.
 TRIES = 10
 
