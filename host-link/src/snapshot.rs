@@ -1,8 +1,12 @@
 //! The values of consecutive registers at one instant, from one read.
 
+use protocol_core::registers::map::{EXTENDED_VERSION, PROTECTION_VERSION, STATUS_VERSION};
 use protocol_core::registers::{Joint, Register};
 
 use crate::span::Span;
+
+/// The layout of each block that is known.
+const KNOWN_LAYOUT: u8 = 1;
 
 /// The values of consecutive registers at one instant.
 ///
@@ -58,6 +62,24 @@ impl Snapshot {
     #[must_use]
     pub fn words(&self, row: &Register) -> [u16; 7] {
         Joint::ALL.map(|joint| self.word(row.of(joint)))
+    }
+
+    /// Does the firmware have registers 128 to 191 ([D21](protocol_core::decisions#d21))?
+    #[must_use]
+    pub fn has_extended_block(&self) -> bool {
+        self.byte(&EXTENDED_VERSION) == KNOWN_LAYOUT
+    }
+
+    /// Does the firmware have registers 192 to 199 ([D27](protocol_core::decisions#d27))?
+    #[must_use]
+    pub fn has_protection_block(&self) -> bool {
+        self.byte(&PROTECTION_VERSION) == KNOWN_LAYOUT
+    }
+
+    /// Does the firmware have registers 240 to 255?
+    #[must_use]
+    pub fn has_status_block(&self) -> bool {
+        self.byte(&STATUS_VERSION) == KNOWN_LAYOUT
     }
 
     /// Takes the values of another snapshot, as far as this one holds their registers.

@@ -14,11 +14,12 @@
 
 use protocol_core::registers::map::{FINE_TARGET, PROTECTION_VERSION};
 use protocol_core::registers::{Map, RegisterFile};
+use protocol_core::report_kind::ReportKind;
 use protocol_core::request::{Alarm, Reply, Report, Request};
 use protocol_core::time::Instant;
 use protocol_core::wire::{Defect, Deframer, FrameBuffer, MIN_LENGTH, ToArm, deframer};
 
-use crate::reports::{ReportKind, Reports};
+use crate::reports::Reports;
 
 /// A read of `count` registers from `address` on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -5,69 +5,14 @@
 //! This file does not know the values in a report.
 
 use protocol_core::registers::RegisterFile;
-use protocol_core::registers::map::{
-    FEEDBACK_FREQUENCY, FINE_POSITION, LOAD, PRESENT_POSITION, REPORT_CONTENT, report_content,
-};
+use protocol_core::registers::map::{FEEDBACK_FREQUENCY, REPORT_CONTENT};
 use protocol_core::registers::map21::{
-    ANGLE_FEEDBACK_FREQUENCY, LOAD_FEEDBACK_FREQUENCY, Map, PRESENT_ANGLE, PRESENT_LOAD,
+    ANGLE_FEEDBACK_FREQUENCY, LOAD_FEEDBACK_FREQUENCY, PRESENT_ANGLE, PRESENT_LOAD,
 };
+use protocol_core::report_kind::ReportKind;
 use protocol_core::time::Instant;
 
 use crate::report_timer::{ReportTimer, highest_frequency};
-
-/// What a report holds.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub(crate) enum ReportKind {
-    /// The present positions of map 2.2.
-    Positions,
-    /// The present positions in hundredths of a degree.
-    FinePositions,
-    /// The present positions in hundredths of a degree, velocities and loads.
-    FineState,
-    /// The present angles of map 2.1.
-    Angles,
-    /// The present loads of map 2.1.
-    Loads,
-}
-
-impl ReportKind {
-    /// The kind for a value of register 189 ([D26](protocol_core::decisions#d26)).
-    const fn from_register(value: u8) -> Self {
-        match value {
-            report_content::FINE_POSITIONS => Self::FinePositions,
-            report_content::FINE_STATE => Self::FineState,
-            _ => Self::Positions,
-        }
-    }
-
-    /// The address of the first register in the report, and how many there are.
-    pub(crate) const fn registers(self) -> (u8, u8) {
-        let row = match self {
-            Self::Positions => PRESENT_POSITION,
-            Self::FinePositions => FINE_POSITION,
-            Self::FineState => {
-                return (FINE_POSITION.address, LOAD.address + LOAD.count - FINE_POSITION.address);
-            }
-            Self::Angles => PRESENT_ANGLE,
-            Self::Loads => PRESENT_LOAD,
-        };
-        (row.address, row.count)
-    }
-
-    /// The map whose form the report has.
-    pub(crate) const fn map(self) -> Map {
-        match self {
-            Self::Positions | Self::FinePositions | Self::FineState => Map::V22,
-            Self::Angles | Self::Loads => Map::V21,
-        }
-    }
-
-    /// Does the report hold registers of the extended block?
-    pub(crate) const fn is_extended(self) -> bool {
-        matches!(self, Self::FinePositions | Self::FineState)
-    }
-}
 
 /// The streams that run.
 #[derive(Clone, Copy, Debug)]
@@ -96,7 +41,7 @@ impl Reports {
         let frequencies =
             [ANGLE_FEEDBACK_FREQUENCY, LOAD_FEEDBACK_FREQUENCY].map(|row| registers.get(row.address));
         let (kind, joints, loads) = if frequencies == [0, 0] {
-            let kind = ReportKind::from_register(registers.get(REPORT_CONTENT.address));
+            let kind = ReportKind::of_content(registers.get(REPORT_CONTENT.address));
             (kind, registers.get(FEEDBACK_FREQUENCY.address), 0)
         } else {
             let [angles, loads] = shares(frequencies, highest_frequency(baud, PRESENT_ANGLE.count));

@@ -44,6 +44,7 @@ pub mod chip_id;
 pub mod decisions;
 pub mod journal;
 pub mod registers;
+pub mod report_kind;
 pub mod request;
 pub mod settings;
 pub mod time;

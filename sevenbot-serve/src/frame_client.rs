@@ -9,7 +9,8 @@ use protocol_core::time::Instant;
 use protocol_core::wire::deframer::gap;
 use protocol_core::wire::{Deframer, FrameBuffer, Function, MAX_LENGTH, ToArm};
 
-use crate::hub::{ClientId, Event, Hub, Stream, WholeRequest};
+use crate::hub::{ClientId, Event, Hub, WholeRequest};
+use protocol_core::report_kind::ReportKind;
 
 /// Bytes for the client beyond which reports are dropped: at 50 Hz, 1.4 s of reports of 14 bytes, or 0.4 s of the longest ones,
 /// 49 bytes.
@@ -117,12 +118,12 @@ impl FrameClient {
 }
 
 /// A report has the form of the register that asked for it ([M4](protocol_core::decisions#m4)).
-fn encode_report(stream: Stream, values: &[u8], frame: &mut FrameBuffer) {
+fn encode_report(stream: ReportKind, values: &[u8], frame: &mut FrameBuffer) {
     let (address, _) = stream.registers();
     match stream {
-        Stream::Positions | Stream::FinePositions | Stream::FineState => {
+        ReportKind::Positions | ReportKind::FinePositions | ReportKind::FineState => {
             Reply { address, values }.encode(frame)
         }
-        Stream::Angles | Stream::Loads => Report { address, values }.encode(frame),
+        ReportKind::Angles | ReportKind::Loads => Report { address, values }.encode(frame),
     }
 }

@@ -12,11 +12,8 @@ use std::fmt;
 use std::time::Duration;
 
 use protocol_core::registers::Joint;
-use protocol_core::registers::map::{
-    EXTENDED_VERSION, FINE_POSITION, FINE_TARGET, PRESENT_POSITION, SPEED, TARGET_POSITION,
-};
+use protocol_core::registers::map::{FINE_POSITION, FINE_TARGET, PRESENT_POSITION, SPEED, TARGET_POSITION};
 
-use crate::fine::KNOWN_LAYOUT;
 use crate::fine_angle::FineAngle;
 use crate::fine_state::FineTargets;
 use crate::recording::{Moment, Recording};
@@ -60,7 +57,7 @@ impl Standing {
     #[must_use]
     pub fn of(registers: &Snapshot) -> Self {
         let speeds = registers.joints(&SPEED).map(|steps| Speed::from_steps(steps).unwrap_or(Speed::MAXIMUM));
-        if registers.byte(&EXTENDED_VERSION) != KNOWN_LAYOUT {
+        if !registers.has_extended_block() {
             let [measured, targets] =
                 [&PRESENT_POSITION, &TARGET_POSITION].map(|row| registers.joints(row).map(f64::from));
             return Self { measured: measured.map(Some), targets, speeds };

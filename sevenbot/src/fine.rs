@@ -15,8 +15,6 @@ use crate::identity::Firmware;
 use crate::joints::frames_of;
 use host_link::{Snapshot, Span};
 
-/// The layout of the extended block that this library knows.
-pub(crate) const KNOWN_LAYOUT: u8 = 1;
 /// The period of a stream, and its watchdog: a program that ends its stream switches both off.
 const PERIOD_AND_WATCHDOG: Span = Span::between(&SET_POINT_PERIOD, &HOST_WATCHDOG);
 
@@ -29,7 +27,7 @@ impl Arm {
         if self.identity().firmware() != Firmware::Ours || self.map() != Map::V22 {
             return Ok(false);
         }
-        Ok(self.read_span(Span::of(&EXTENDED_VERSION))?.byte(&EXTENDED_VERSION) == KNOWN_LAYOUT)
+        Ok(self.read_span(Span::of(&EXTENDED_VERSION))?.has_extended_block())
     }
 
     /// Positions, velocities and loads. Only for an arm with the extended block.
@@ -49,7 +47,7 @@ impl Arm {
             return Ok(None);
         }
         let snapshot = self.read_span(Span::between(&FINE_POSITION, &EXTENDED_VERSION))?;
-        Ok((snapshot.byte(&EXTENDED_VERSION) == KNOWN_LAYOUT).then(|| FineState::new(&snapshot)))
+        Ok(snapshot.has_extended_block().then(|| FineState::new(&snapshot)))
     }
 
     /// The targets in hundredths of a degree, joint 1 first. Only for an arm with the extended block.

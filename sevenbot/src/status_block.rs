@@ -3,8 +3,7 @@
 use protocol_core::registers::Joint;
 use protocol_core::registers::map::{
     FAULTS, FRAMES_ACCEPTED, FRAMES_CORRUPTED, FRAMES_REFUSED, LAST_REFUSAL, LAST_REFUSED_REGISTER,
-    MISSING_SERVOS, MOVING_JOINTS, SERVO_BUS_ERRORS, SERVO_TEMPERATURE, STATUS_VERSION, SUPPLY_VOLTAGE,
-    refusal,
+    MISSING_SERVOS, MOVING_JOINTS, SERVO_BUS_ERRORS, SERVO_TEMPERATURE, SUPPLY_VOLTAGE, refusal,
 };
 
 use crate::arm::{Arm, STATUS};
@@ -37,8 +36,7 @@ impl Arm {
             return Ok(None);
         }
         let snapshot = self.read_span(STATUS)?;
-        let is_there = snapshot.byte(&STATUS_VERSION) != 0;
-        Ok(is_there.then(|| StatusBlock::from(snapshot)))
+        Ok(snapshot.has_status_block().then(|| StatusBlock::from(snapshot)))
     }
 }
 

@@ -50,7 +50,7 @@ const TEXTS = {
   no_arm: ["The class has no real arm: start `sevenbot class` with --port.", "课堂没有真机：请用 --port 启动 `sevenbot class`。"],
   arm_silent: ["The real arm does not answer, so it was not given.", "真机没有应答，未交出。"],
   pupil_gone: ["This pupil is not connected, so the real arm was not given.", "该学生未连接，真机未交出。"],
-  bad_time: ["Give the arm for half a minute to 60 minutes.", "时间应为半分钟到 60 分钟。"],
+  bad_time: ["Give the arm for a second to 60 minutes.", "时间应为 1 秒到 60 分钟。"],
   doing: {
     no_arm: ["the arm does not answer", "机械臂无应答"],
     ready: ["ready", "就绪"],

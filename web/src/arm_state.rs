@@ -4,9 +4,8 @@ use kinematics::geometry::{LINKAGE_MAX, LINKAGE_MIN};
 use kinematics::{forward, limits};
 use sevenbot::cartesian::{Breach, Guard, JointPath, Obstacle};
 use sevenbot::map::{
-    EXTENDED_VERSION, FAULTS, FINE_POSITION, FINE_TARGET, LOAD, MISSING_SERVOS, MOTOR_STATE, MOVING_JOINTS,
-    PRESENT_POSITION, SERVO_TEMPERATURE, SPEED, STATUS_VERSION, SUPPLY_VOLTAGE, TARGET_POSITION, TIME,
-    VELOCITY, motor_state,
+    FAULTS, FINE_POSITION, FINE_TARGET, LOAD, MISSING_SERVOS, MOTOR_STATE, MOVING_JOINTS, PRESENT_POSITION,
+    SERVO_TEMPERATURE, SPEED, SUPPLY_VOLTAGE, TARGET_POSITION, TIME, VELOCITY, motor_state,
 };
 use sevenbot::{FineAngle, Health, Joint, MoveTime, Problem, ProblemKind, Snapshot, Speed};
 
@@ -52,7 +51,7 @@ impl ArmState {
     /// From registers 0 to 255.
     #[must_use]
     pub fn new(registers: &Snapshot) -> Self {
-        let is_fine = has_extended_block(registers);
+        let is_fine = registers.has_extended_block();
         let whole = |row| registers.joints(row).map(f32::from);
         let hundredths = |word| f32::from(word) / 100.0;
         let tenths = |row| registers.words(row).map(|word| f32::from(word.cast_signed()) / 10.0);
@@ -65,7 +64,7 @@ impl ArmState {
         let targets =
             if is_fine { registers.words(&FINE_TARGET).map(hundredths) } else { whole(&TARGET_POSITION) };
         let [velocities, loads] = [&VELOCITY, &LOAD].map(|row| if is_fine { tenths(row) } else { [0.0; 7] });
-        let has_status = registers.byte(&STATUS_VERSION) == 1;
+        let has_status = registers.has_status_block();
         let status = |row| if has_status { registers.byte(row) } else { 0 };
         let known = |value: u8| (value != 0).then_some(value);
         let mut state = Self {
@@ -178,18 +177,12 @@ pub const fn breach_text(breach: &Breach) -> &'static str {
     }
 }
 
-/// Does the arm have registers 128 to 191 (D21 to D26)?
-#[must_use]
-pub fn has_extended_block(registers: &Snapshot) -> bool {
-    registers.byte(&EXTENDED_VERSION) == 1
-}
-
 /// The frame that sends one joint, 1 to 7, to an angle in degrees. `None` if there is no such joint or angle.
 #[must_use]
 pub fn target_frame(registers: &Snapshot, joint: u8, degrees: f32) -> Option<(u8, Vec<u8>)> {
     let joint = sevenbot::Joint::new(joint)?;
     let angle = FineAngle::from_degrees(degrees.into())?;
-    Some(if has_extended_block(registers) {
+    Some(if registers.has_extended_block() {
         (FINE_TARGET.of(joint), angle.hundredths().to_le_bytes().to_vec())
     } else {
         (TARGET_POSITION.of(joint), vec![angle.nearest().degrees()])

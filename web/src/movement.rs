@@ -19,7 +19,6 @@ use sevenbot::recording::{Recording, RecordingError};
 use sevenbot::stream::{StreamOptions, WatchdogAction};
 use sevenbot::{Health, Joint, Snapshot};
 
-use crate::arm_state::has_extended_block;
 use crate::client::{BAUD, Client};
 use crate::confirmed::{Confirmed, NotTaken, write_all};
 use crate::stop::since_start;
@@ -145,7 +144,7 @@ impl Player {
         recording.check_speeds(1.0).map_err(PlayRefusal::NoRecording)?;
         let first = recording.moments().next().map_or([None; 7], |first| first.pose.map(Some));
         let approach = Approach::plan(&Standing::of(registers), &first, rule).map_err(PlayRefusal::TooFar)?;
-        let is_fine = has_extended_block(registers);
+        let is_fine = registers.has_extended_block();
         let watch = MoveWatch::new(since_start(now), ALL_JOINTS, BAUD);
         Ok(Self {
             recording,

@@ -5,7 +5,7 @@
 //!             └── motors off, a problem, a stop or a pause: ParkFailure, and the arm holds ──┘
 //! ```
 //!
-//! The way there and the limits are those of `sevenbot park`.
+//! The way there, its speed and the time of the watch are those of `sevenbot park`.
 
 use protocol_core::time::{Duration, Instant};
 use sevenbot::fine::FineTargets;

@@ -17,7 +17,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use clap::Args;
 
-use crate::run::{TaskResult, root, run, target_directory};
+use crate::run::{TaskResult, empty_folder, root, run, target_directory};
 use crate::trials::Trials;
 
 /// The targets, and the number of inputs in the fixed form, for about 15 s of one processor. Measured in its time, inputs per
@@ -133,9 +133,7 @@ fn fuzz_further(programs: &Path, target: &str, seed: u32, amount: &str) -> io::R
 /// Starts with the corpus alone.
 fn fuzz_from_corpus(programs: &Path, target: &str, seed: u32, amount: &str) -> io::Result<Output> {
     let inputs_found = target_directory().join("fuzz/fixed").join(target);
-    if inputs_found.exists() {
-        fs::remove_dir_all(&inputs_found)?;
-    }
+    empty_folder(&inputs_found)?;
     fuzz(programs, target, seed, amount, &inputs_found)
 }
 

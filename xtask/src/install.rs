@@ -10,81 +10,41 @@ struct Tool {
     program: &'static str,
     /// Arguments with which it succeeds.
     arguments: &'static [&'static str],
-    /// Its package in Debian and Ubuntu.
+    /// Its packages in Debian and Ubuntu.
     package: &'static str,
     /// Its purpose.
     purpose: &'static str,
 }
 
-/// All programs know this.
-const VERSION: &[&str] = &["--version"];
+/// A tool that knows `--version`.
+const fn tool(program: &'static str, package: &'static str, purpose: &'static str) -> Tool {
+    Tool { program, arguments: &["--version"], package, purpose }
+}
 
 const TOOLS: [Tool; 10] = [
-    Tool { program: QEMU, arguments: VERSION, package: QEMU, purpose: "runs the image for the arm" },
+    tool(QEMU, QEMU, "runs the image for the arm"),
+    tool("curl", "curl ca-certificates", "fetches the editor of the page's programs"),
+    tool("c++", "g++", "builds the fuzzer"),
+    tool("chromium", "chromium", "shows the page in its tests"),
+    tool("firefox-esr", "firefox-esr", "shows the page in another browser"),
+    Tool { arguments: &["-help"], ..tool("Xvfb", "xvfb", "is the screen of Firefox") },
+    tool("python3", "python3", "runs the Python package"),
     Tool {
-        program: "curl",
-        arguments: VERSION,
-        package: "curl ca-certificates",
-        purpose: "fetches the editor of the page's programs",
-    },
-    Tool { program: "c++", arguments: VERSION, package: "g++", purpose: "builds the fuzzer" },
-    Tool {
-        program: "chromium",
-        arguments: VERSION,
-        package: "chromium",
-        purpose: "shows the page in its tests",
-    },
-    Tool {
-        program: "firefox-esr",
-        arguments: VERSION,
-        package: "firefox-esr",
-        purpose: "shows the page in another browser",
-    },
-    Tool { program: "Xvfb", arguments: &["-help"], package: "xvfb", purpose: "is the screen of Firefox" },
-    Tool { program: "python3", arguments: VERSION, package: "python3", purpose: "runs the Python package" },
-    Tool {
-        program: "python3",
         arguments: &["-c", "import ensurepip, venv"],
-        package: "python3-venv",
-        purpose: "makes environments for the Python package",
+        ..tool("python3", "python3-venv", "makes environments for the Python package")
     },
-    Tool {
-        program: "ip",
-        arguments: &["-Version"],
-        package: "iproute2",
-        purpose: "opens the network of the tests with ROS",
-    },
-    Tool {
-        program: "x86_64-w64-mingw32-gcc",
-        arguments: VERSION,
-        package: "gcc-mingw-w64-x86-64",
-        purpose: "links the programs for Windows",
-    },
+    Tool { arguments: &["-Version"], ..tool("ip", "iproute2", "opens the network of the tests with ROS") },
+    tool("x86_64-w64-mingw32-gcc", "gcc-mingw-w64-x86-64", "links the programs for Windows"),
 ];
 
 /// What makes and tries a release.
 const RELEASE_TOOLS: [Tool; 6] = [
-    Tool { program: "dpkg-deb", arguments: VERSION, package: "dpkg", purpose: "makes the Debian package" },
-    Tool {
-        program: "mmdebstrap",
-        arguments: VERSION,
-        package: "mmdebstrap",
-        purpose: "makes the bare system on which a release is tried",
-    },
-    Tool { program: "wine", arguments: VERSION, package: "wine", purpose: "runs the program for Windows" },
-    Tool {
-        program: "qemu-aarch64-static",
-        arguments: VERSION,
-        package: "qemu-user-static",
-        purpose: "runs the programs for aarch64",
-    },
-    Tool { program: "lintian", arguments: VERSION, package: "lintian", purpose: "checks the Debian package" },
-    Tool {
-        program: "dfu-suffix",
-        arguments: VERSION,
-        package: "dfu-util",
-        purpose: "checks the image for USB",
-    },
+    tool("dpkg-deb", "dpkg", "makes the Debian package"),
+    tool("mmdebstrap", "mmdebstrap", "makes the bare system on which a release is tried"),
+    tool("wine", "wine", "runs the program for Windows"),
+    tool("qemu-aarch64-static", "qemu-user-static", "runs the programs for aarch64"),
+    tool("lintian", "lintian", "checks the Debian package"),
+    tool("dfu-suffix", "dfu-util", "checks the image for USB"),
 ];
 
 /// Installs the missing tools that each run of the tests needs.

@@ -1,13 +1,12 @@
 //! Tests the plugin for LeRobot with LeRobot's base classes alone, and with all of LeRobot.
 
 use std::env;
-use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::Command;
 
 use crate::python::{copy_of, folder, wheel};
 use crate::run::{TaskResult, build_host_sim, build_image, root, run_command};
-use crate::venv::{self, pip};
+use crate::venv::{self, interpreter, pip};
 
 /// LeRobot without what it depends on: some gigabytes, of which its base classes need little.
 const LEROBOT: &str = "lerobot==0.6.1";
@@ -20,11 +19,6 @@ const WHOLE: &str = "lerobot[core-scripts]==0.6.1";
 const TEST_PACKAGES: [&str; 2] = ["pytest==9.2.0", "mypy==2.4.1"];
 /// The free disk that the whole installation needs, in GiB: 3 for pip's downloads, and 6 that it keeps.
 const NEEDED_GIB: u64 = 9;
-/// Interpreters to look for on PATH. LeRobot 0.6.1 needs 3.12.
-const INTERPRETERS: [&str; 4] = ["python3", "python3.12", "python3.13", "python3.14"];
-/// Fails below 3.12.
-const VERSION: &str = "import sys; assert sys.version_info >= (3, 12)";
-
 /// Types and behaviour of the plugin, with the base classes of LeRobot.
 pub(crate) fn check() -> TaskResult {
     let python = environment("lerobot-base")?;
@@ -60,27 +54,7 @@ fn plugin() -> PathBuf {
 
 /// An environment of its own, which is kept for the next run.
 fn environment(name: &str) -> TaskResult<PathBuf> {
-    venv::with_packages(&folder().join(name), interpreter, &[])
-}
-
-/// A Python that LeRobot accepts: on PATH, or one that pyenv has installed.
-fn interpreter() -> TaskResult<PathBuf> {
-    let on_path = INTERPRETERS.into_iter().map(PathBuf::from);
-    let found = on_path.chain(of_pyenv()).find(|program| is_new_enough(program));
-    found.ok_or_else(|| "LeRobot needs Python 3.12 or later: neither PATH nor pyenv has one".into())
-}
-
-fn of_pyenv() -> impl Iterator<Item = PathBuf> {
-    let home = env::var_os("PYENV_ROOT").map(PathBuf::from);
-    let home = home.or_else(|| env::home_dir().map(|home| home.join(".pyenv")));
-    let versions = home.and_then(|home| fs::read_dir(home.join("versions")).ok());
-    versions.into_iter().flatten().flatten().map(|version| version.path().join("bin/python3"))
-}
-
-fn is_new_enough(program: &Path) -> bool {
-    let mut python = Command::new(program);
-    python.args(["-c", VERSION]).stdout(Stdio::null()).stderr(Stdio::null());
-    python.status().is_ok_and(|status| status.success())
+    venv::with_packages(&folder().join(name), || interpreter("LeRobot", (3, 12)..=(3, 14)), &[])
 }
 
 /// Fails if there is too little free disk, before anything is downloaded.

@@ -1,12 +1,11 @@
 //! The Python package: built as a wheel, installed into a fresh environment, and tested there.
 
-use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::Command;
 
-use crate::run::{TaskResult, build_image, root, run_command, target_directory};
-use crate::venv::{self, pip};
+use crate::run::{TaskResult, build_image, empty_folder, root, run_command, target_directory};
+use crate::venv::{self, Version, pip};
 
 /// The packages from PyPI, at versions that were tried. gymnasium, mujoco and numpy are optional for users, but have tests;
 /// mcap and rosbags read what the package writes.
@@ -24,11 +23,8 @@ const PACKAGES: [&str; 10] = [
 ];
 /// For the example with several processes.
 const RAY: &str = "ray==2.51.1";
-/// Interpreters that are tested if they are on PATH. The wheel is the same for all of them.
-pub(crate) const INTERPRETERS: [&str; 6] =
-    ["python3", "python3.10", "python3.11", "python3.12", "python3.13", "python3.14"];
-/// Prints the version, and fails below 3.10.
-const VERSION: &str = "import sys; assert sys.version_info >= (3, 10); print('%d.%d' % sys.version_info[:2])";
+/// The oldest version that the package supports.
+pub(crate) const OLDEST: Version = (3, 10);
 
 /// Builds the wheel, and tests it with all interpreters on PATH.
 pub(crate) fn check() -> TaskResult {
@@ -36,8 +32,8 @@ pub(crate) fn check() -> TaskResult {
     // Programs of blocks run on it.
     emulator::need_qemu()?;
     build_image()?;
-    for (version, program) in &interpreters() {
-        println!("Python {version}");
+    for (version, program) in interpreters() {
+        println!("Python {}.{}", version.0, version.1);
         test(&environment(version, program)?, &wheel)?;
     }
     Ok(())
@@ -46,7 +42,7 @@ pub(crate) fn check() -> TaskResult {
 /// The example with Ray: two workers do what one process does. With the first interpreter on PATH.
 pub(crate) fn ray() -> TaskResult {
     let (version, program) = first_interpreter()?;
-    let python = environment(&version, program)?;
+    let python = environment(version, program)?;
     let wheel = build_wheel(&python)?;
     run_command(pip(&python).arg(RAY))?;
     run_command(pip(&python).args(["--force-reinstall", "--no-deps"]).arg(wheel))?;
@@ -56,30 +52,15 @@ pub(crate) fn ray() -> TaskResult {
 /// Builds the wheel with the first interpreter on PATH.
 pub(crate) fn wheel() -> TaskResult<PathBuf> {
     let (version, program) = first_interpreter()?;
-    build_wheel(&environment(&version, program)?)
+    build_wheel(&environment(version, program)?)
 }
 
-fn first_interpreter() -> TaskResult<(String, &'static str)> {
-    interpreters().into_iter().next().ok_or_else(|| "no Python of at least 3.10 on PATH".into())
+fn first_interpreter() -> TaskResult<(Version, PathBuf)> {
+    interpreters().next().ok_or_else(|| "no Python of at least 3.10 on PATH".into())
 }
 
-/// The versions on PATH, each once, with a program of each.
-pub(crate) fn interpreters() -> Vec<(String, &'static str)> {
-    with_versions(INTERPRETERS.into_iter())
-}
-
-/// The programs that are a Python of at least 3.10, with their versions. Each version is there once.
-pub(crate) fn with_versions<P: AsRef<OsStr>>(programs: impl Iterator<Item = P>) -> Vec<(String, P)> {
-    let mut found: Vec<(String, P)> = Vec::new();
-    for program in programs {
-        let output = Command::new(&program).args(["-c", VERSION]).stderr(Stdio::null()).output();
-        let Some(output) = output.ok().filter(|output| output.status.success()) else { continue };
-        let version = String::from_utf8_lossy(&output.stdout).trim().to_owned();
-        if found.iter().all(|(other, _)| *other != version) {
-            found.push((version, program));
-        }
-    }
-    found
+fn interpreters() -> impl Iterator<Item = (Version, PathBuf)> {
+    venv::on_path().into_iter().filter(|(version, _)| *version >= OLDEST)
 }
 
 /// Where the environments and the wheel are.
@@ -88,16 +69,14 @@ pub(crate) fn folder() -> PathBuf {
 }
 
 /// The environment of a version.
-fn environment(version: &str, program: &str) -> TaskResult<PathBuf> {
-    venv::with_packages(&folder().join(version), || Ok(program.into()), &PACKAGES)
+fn environment((major, minor): Version, program: PathBuf) -> TaskResult<PathBuf> {
+    venv::with_packages(&folder().join(format!("{major}.{minor}")), || Ok(program), &PACKAGES)
 }
 
 /// The profile is that of the other tests, which builds quickly.
 fn build_wheel(python: &Path) -> TaskResult<PathBuf> {
     let wheels = folder().join("wheels");
-    if wheels.exists() {
-        fs::remove_dir_all(&wheels)?;
-    }
+    empty_folder(&wheels)?;
     let mut maturin = Command::new(python);
     maturin.args(["-m", "maturin", "build", "--quiet", "--profile", "dev", "--manifest-path"]);
     run_command(maturin.arg(root().join("python/Cargo.toml")).arg("--out").arg(&wheels))?;
@@ -133,8 +112,6 @@ fn pytest(python: &Path, tests: &str) -> Command {
 
 /// A copy of a package: setuptools would leave files beside the sources.
 pub(crate) fn copy_of(package: &Path, copy: &Path) -> TaskResult {
-    if copy.exists() {
-        fs::remove_dir_all(copy)?;
-    }
-    run_command(Command::new("cp").arg("-r").arg(package).arg(copy))
+    empty_folder(copy)?;
+    run_command(Command::new("cp").arg("-r").arg(package.join(".")).arg(copy))
 }

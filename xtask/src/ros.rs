@@ -2,13 +2,13 @@
 
 use std::env;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::Command;
 
 use crate::python::{copy_of, wheel};
 use crate::run::{
     TESTED, TaskResult, build_host_sim, build_image, cargo, root, run_command, target_directory,
 };
-use crate::venv::{self, pip};
+use crate::venv::{self, interpreter, pip};
 
 /// The packages from PyPI, at versions that were tried.
 const PACKAGES: [&str; 15] = [
@@ -28,10 +28,6 @@ const PACKAGES: [&str; 15] = [
     "pytest==9.2.0",
     "pytest-xdist==3.8.0",
 ];
-/// Interpreters for which ROS 2 has wheels, the one of Debian 12 first.
-const INTERPRETERS: [&str; 5] = ["python3.11", "python3.12", "python3.13", "python3.10", "python3"];
-/// Fails for other versions.
-const VERSION: &str = "import sys; assert (3, 10) <= sys.version_info[:2] <= (3, 13)";
 /// Processes that run tests, most of which wait for an arm.
 const PROCESSES: &str = "2";
 /// The network of the tests has only this computer, and needs no administrator.
@@ -39,7 +35,8 @@ const NETWORK: &str = "ip link set lo up && exec \"$@\"";
 
 /// Installs and tests the packages.
 pub(crate) fn check() -> TaskResult {
-    let python = venv::with_packages(&folder().join("venv"), interpreter, &PACKAGES)?;
+    let python =
+        venv::with_packages(&folder().join("venv"), || interpreter("ROS 2", (3, 10)..=(3, 13)), &PACKAGES)?;
     let wheel = wheel()?;
     // Its name is another one, so that it is not imported.
     let package = folder().join("package");
@@ -54,15 +51,6 @@ pub(crate) fn check() -> TaskResult {
 
 fn folder() -> PathBuf {
     target_directory().join("ros")
-}
-
-fn interpreter() -> TaskResult<PathBuf> {
-    let found = INTERPRETERS.into_iter().find(|program| {
-        let mut command = Command::new(program);
-        command.args(["-c", VERSION]).stderr(Stdio::null());
-        command.status().is_ok_and(|status| status.success())
-    });
-    found.map(PathBuf::from).ok_or_else(|| "ROS 2 needs Python 3.10, 3.11, 3.12 or 3.13 on PATH".into())
 }
 
 /// The types of the installed package.

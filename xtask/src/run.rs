@@ -1,6 +1,8 @@
 //! Runs the programs that the tasks consist of.
 
+use std::path::Path;
 use std::process::Command;
+use std::{fs, io};
 
 pub(crate) use emulator::chip_program::{CHIP, ChipProgram, IMAGE, root, target_directory};
 pub(crate) use emulator::process::{ChildProcess, TaskResult, wait_for};
@@ -59,6 +61,14 @@ pub(crate) fn link() -> TaskResult<&'static [ChipProgram]> {
     build_image()?;
     build_footprint(SMALL)?;
     Ok(LINKED)
+}
+
+/// Makes a folder empty, and creates it if it does not exist.
+pub(crate) fn empty_folder(folder: &Path) -> io::Result<()> {
+    if folder.exists() {
+        fs::remove_dir_all(folder)?;
+    }
+    fs::create_dir_all(folder)
 }
 
 /// Builds the firmware image.

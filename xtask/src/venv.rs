@@ -1,13 +1,68 @@
-//! Virtual environments of Python, which are kept for the next run.
+//! The interpreters of Python on this computer, and virtual environments, which are kept for the next run.
 
-use std::fs;
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::{env, fs};
 
 use crate::run::{TaskResult, run_command};
 
 /// Installs packages as pip does, but asks PyPI for many of them at once. A version that was tried.
 const INSTALLER: &str = "uv==0.13.9";
+
+/// Programs to look for on PATH.
+const INTERPRETERS: [&str; 6] =
+    ["python3", "python3.11", "python3.12", "python3.13", "python3.10", "python3.14"];
+/// Prints the version.
+const VERSION: &str = "import sys; print(*sys.version_info[:2])";
+
+/// A version of Python, such as 3 and 11.
+pub(crate) type Version = (u8, u8);
+
+/// The versions on PATH, each with a program.
+pub(crate) fn on_path() -> Vec<(Version, PathBuf)> {
+    with_versions(INTERPRETERS.into_iter().map(PathBuf::from))
+}
+
+/// The versions on PATH and in pyenv, each with a program.
+pub(crate) fn of_this_computer() -> Vec<(Version, PathBuf)> {
+    let home = env::var_os("PYENV_ROOT").map(PathBuf::from);
+    let home = home.or_else(|| env::home_dir().map(|home| home.join(".pyenv")));
+    let of_pyenv = home.and_then(|home| fs::read_dir(home.join("versions")).ok());
+    let of_pyenv = of_pyenv.into_iter().flatten().flatten().map(|version| version.path().join("bin/python3"));
+    with_versions(INTERPRETERS.into_iter().map(PathBuf::from).chain(of_pyenv))
+}
+
+/// A program of one of these versions, for what needs it.
+pub(crate) fn interpreter(what: &str, versions: RangeInclusive<Version>) -> TaskResult<PathBuf> {
+    let found = of_this_computer().into_iter().find(|(version, _)| versions.contains(version));
+    let ((major, first), (_, last)) = versions.into_inner();
+    let none = || {
+        format!("{what} needs Python {major}.{first} to {major}.{last}: neither PATH nor pyenv has one")
+            .into()
+    };
+    found.map(|(_, program)| program).ok_or_else(none)
+}
+
+/// The programs that are a Python, with their versions. Each version is there once.
+fn with_versions(programs: impl Iterator<Item = PathBuf>) -> Vec<(Version, PathBuf)> {
+    let mut found: Vec<(Version, PathBuf)> = Vec::new();
+    for program in programs {
+        let output = Command::new(&program).args(["-c", VERSION]).stderr(Stdio::null()).output();
+        let text =
+            output.map(|output| String::from_utf8_lossy(&output.stdout).into_owned()).unwrap_or_default();
+        let version = text
+            .trim()
+            .split_once(' ')
+            .and_then(|(major, minor)| Some((major.parse().ok()?, minor.parse().ok()?)));
+        if let Some(version) = version
+            && found.iter().all(|(other, _)| *other != version)
+        {
+            found.push((version, program));
+        }
+    }
+    found
+}
 
 /// The Python of an environment in `folder` with these packages from PyPI. It is made anew, with the interpreter that `program`
 /// finds, if it does not work or the list has changed.

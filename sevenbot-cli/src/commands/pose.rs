@@ -73,11 +73,11 @@ pub(crate) struct HomeArgs {
 #[derive(Debug, Args)]
 struct PaceArgs {
     /// Speed of these joints, as the register has it: 1 to 100 steps of 1.9 degrees per second, or 0 for the motors'
-    /// maximum. Or in degrees per second, 2deg/s to 190deg/s.
+    /// maximum. Or in degrees per second, 2deg/s to 190deg/s: the nearest step that is not faster.
     #[arg(long, value_name = "STEPS|DEG/S", allow_hyphen_values = true, value_parser = speed)]
     speed: Option<Speed>,
-    /// Duration of the move, as the register has it: 0 to 100 steps of 100 ms. Or in seconds, 0.1s to 10s. Sets the speeds to
-    /// 0, so that it applies.
+    /// Duration of the move, as the register has it: 0 to 100 steps of 100 ms. Or in seconds, 0.1s to 10s: the nearest
+    /// step that is not shorter. Sets the speeds to 0, so that it applies.
     #[arg(long, value_name = "STEPS|S", conflicts_with = "speed", allow_hyphen_values = true, value_parser = time)]
     time: Option<MoveTime>,
     /// Wait until the joints have arrived.
@@ -99,33 +99,24 @@ impl PaceArgs {
     }
 }
 
-/// Parses a speed, as 30 or 57deg/s: the nearest step.
+/// Parses a speed, as 30 or 57deg/s: the nearest step that is not faster.
 fn speed(text: &str) -> Result<Speed, &'static str> {
-    let steps = match text.strip_suffix("deg/s") {
-        None => text.parse().ok(),
-        Some(number) => steps(number, Speed::from_steps(1).map_or(1.0, Speed::degrees_per_second)),
+    let speed = match text.strip_suffix("deg/s") {
+        None => text.parse().ok().and_then(Speed::from_steps),
+        Some(number) => number.parse().ok().and_then(Speed::at_most),
     };
-    let speed = steps.and_then(Speed::from_steps);
     speed.ok_or(
         "a speed from 0 to 100 steps of 1.9 degrees per second, as 30, or in degrees per second, as 57deg/s",
     )
 }
 
-/// Parses a duration, as 20 or 2s: the nearest step.
+/// Parses a duration, as 20 or 2s: the nearest step that is not shorter.
 fn time(text: &str) -> Result<MoveTime, &'static str> {
-    let steps = match text.strip_suffix('s') {
-        None => text.parse().ok(),
-        Some(number) => steps(number, 0.1),
+    let time = match text.strip_suffix('s') {
+        None => text.parse().ok().and_then(MoveTime::from_steps),
+        Some(number) => number.parse().ok().and_then(MoveTime::at_least),
     };
-    let time = steps.and_then(MoveTime::from_steps);
     time.ok_or("a duration from 0 to 100 steps of 100 ms, as 20, or in seconds, as 2s")
-}
-
-/// The whole steps nearest to a number, 1 to 100.
-fn steps(number: &str, step: f64) -> Option<u8> {
-    let steps = (number.parse::<f64>().ok()? / step).round();
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within the range")]
-    (1.0..=100.0).contains(&steps).then_some(steps as u8)
 }
 
 /// The argument for one joint.
@@ -320,7 +311,7 @@ mod tests {
     #[test]
     fn speeds_and_durations_are_steps_or_have_a_unit() {
         let steps_of = |text| speed(text).map(Speed::steps).ok();
-        assert_eq!(["30", "57deg/s", "58deg/s", "0"].map(steps_of), [Some(30), Some(30), Some(31), Some(0)]);
+        assert_eq!(["30", "57deg/s", "58deg/s", "0"].map(steps_of), [Some(30), Some(30), Some(30), Some(0)]);
         assert_eq!(["190deg/s", "191deg/s", "0deg/s", "101", "2x", "40mm/s"].map(steps_of)[1..], [None; 5]);
         let steps_of = |text| time(text).map(MoveTime::steps).ok();
         assert_eq!(["20", "2s", "0.5s", "10s"].map(steps_of), [Some(20), Some(20), Some(5), Some(100)]);

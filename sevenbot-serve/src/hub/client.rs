@@ -14,7 +14,7 @@ use super::readings::Readings;
 use super::request::WholeRequest;
 use super::schedule::Schedule;
 use super::shares::Share;
-use super::stream::Stream;
+use protocol_core::report_kind::ReportKind;
 
 /// Requests of one client that may wait. The maker's arm has the same limit for its WebSocket.
 pub(crate) const MOST_WAITING: usize = 20;
@@ -48,7 +48,7 @@ pub enum Event {
     /// A report that the client's own registers ask for.
     Report {
         /// The stream.
-        stream: Stream,
+        stream: ReportKind,
         /// The values of the stream's registers.
         values: Vec<u8>,
     },
@@ -146,7 +146,7 @@ impl Client {
     }
 
     /// Queues a report, if one of this stream is due.
-    pub(crate) fn report(&mut self, now: Instant, stream: Stream, values: &[u8]) -> bool {
+    pub(crate) fn report(&mut self, now: Instant, stream: ReportKind, values: &[u8]) -> bool {
         let is_due = self.schedule.take_due(now, stream) && self.events.len() < MOST_REPORTS;
         if is_due {
             self.readings.note(now, stream.registers().0, values);

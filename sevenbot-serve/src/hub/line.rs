@@ -13,7 +13,7 @@ use protocol_core::time::{Duration, Instant};
 use super::client::{Client, Event};
 use super::client_id::ClientId;
 use super::request::{WholeRequest, reply_bytes};
-use super::stream::Stream;
+use protocol_core::report_kind::ReportKind;
 
 /// What a client waits for. A reply that is late is asked for again after 100 ms or more, unless something was written since:
 /// a lost frame costs its client, and those that wait for the line, no more than that. The end is late, because a computer that
@@ -42,7 +42,7 @@ pub(crate) enum Owner {
     /// A client.
     Client(ClientId),
     /// The sampler.
-    Sample(Stream),
+    Sample(ReportKind),
     /// The hub, to hold the arm.
     Hold,
     /// The hub, to know the speeds before it slows the joints down.

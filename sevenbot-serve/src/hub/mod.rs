@@ -35,7 +35,6 @@ mod sampler;
 mod schedule;
 mod sending;
 mod shares;
-mod stream;
 mod watchdog;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -58,7 +57,6 @@ pub use self::client::{Event, LONGEST_WAIT};
 pub use self::client_id::ClientId;
 pub use self::holding::HoldOutcome;
 pub use self::request::WholeRequest;
-pub use self::stream::Stream;
 
 /// What clients may do.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -7,7 +7,7 @@ use protocol_core::registers::map::{FEEDBACK_FREQUENCY, OFFSET, REPORT_CONTENT};
 use protocol_core::registers::map21::{ANGLE_FEEDBACK_FREQUENCY, LOAD_FEEDBACK_FREQUENCY};
 use protocol_core::registers::{Map, Register};
 
-use super::stream::Stream;
+use protocol_core::report_kind::ReportKind;
 
 /// The values of a client's own registers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -26,13 +26,17 @@ pub(crate) struct OwnRegisters {
 
 impl OwnRegisters {
     /// The frequency of a stream, in Hz.
-    pub(crate) const fn frequency(&self, stream: Stream) -> u8 {
+    pub(crate) const fn frequency(&self, stream: ReportKind) -> u8 {
         match stream {
-            Stream::Positions | Stream::FinePositions | Stream::FineState => {
-                if Stream::of_content(self.content).index() == stream.index() { self.positions } else { 0 }
+            ReportKind::Positions | ReportKind::FinePositions | ReportKind::FineState => {
+                if ReportKind::of_content(self.content).index() == stream.index() {
+                    self.positions
+                } else {
+                    0
+                }
             }
-            Stream::Angles => self.angles,
-            Stream::Loads => self.loads,
+            ReportKind::Angles => self.angles,
+            ReportKind::Loads => self.loads,
         }
     }
 
@@ -111,7 +115,7 @@ mod tests {
         let mut own = OwnRegisters::default();
         let mut values = [90, 90, 65, 90, 90, 90, 80, 30];
         assert!(own.write(Map::V22, 46, &mut values));
-        assert_eq!((own.frequency(Stream::Positions), values), (30, [90, 90, 65, 90, 90, 90, 80, 0]));
+        assert_eq!((own.frequency(ReportKind::Positions), values), (30, [90, 90, 65, 90, 90, 90, 80, 0]));
         let mut reply = [1, 2, 3];
         own.overlay(52, &mut reply);
         assert_eq!(reply, [1, 30, 3]);
@@ -120,7 +124,7 @@ mod tests {
     }
 
     fn frequencies(own: &OwnRegisters) -> [u8; 3] {
-        [Stream::Positions, Stream::Angles, Stream::Loads].map(|stream| own.frequency(stream))
+        [ReportKind::Positions, ReportKind::Angles, ReportKind::Loads].map(|stream| own.frequency(stream))
     }
 
     #[test]

@@ -9,12 +9,12 @@ use super::own_registers::OwnRegisters;
 use super::request::reply_bytes;
 use super::schedule::Timer;
 use super::shares::Share;
-use super::stream::{STREAMS, Stream};
+use protocol_core::report_kind::ReportKind;
 
 /// Reads the arm for all clients.
 #[derive(Debug)]
 pub(crate) struct Sampler {
-    timers: [Timer; STREAMS],
+    timers: [Timer; ReportKind::ALL.len()],
     pub(crate) share: Share,
     /// A sample is due, and its share has joined those of the clients.
     waits: bool,
@@ -25,7 +25,7 @@ pub(crate) struct Sampler {
 impl Sampler {
     /// A sampler that reads nothing. `baud` is in bits per second.
     pub(crate) const fn new(baud: u32) -> Self {
-        Self { timers: [Timer::OFF; STREAMS], share: Share::IDLE, waits: false, baud }
+        Self { timers: [Timer::OFF; ReportKind::ALL.len()], share: Share::IDLE, waits: false, baud }
     }
 
     /// Sets the highest frequencies that these clients want.
@@ -35,8 +35,8 @@ impl Sampler {
         clients: impl Iterator<Item = &'a OwnRegisters> + Clone,
     ) {
         let wanted =
-            Stream::ALL.map(|stream| clients.clone().map(|own| own.frequency(stream)).max().unwrap_or(0));
-        let streams = || Stream::ALL.into_iter().zip(wanted);
+            ReportKind::ALL.map(|stream| clients.clone().map(|own| own.frequency(stream)).max().unwrap_or(0));
+        let streams = || ReportKind::ALL.into_iter().zip(wanted);
         let active = streams().filter(|&(_, wanted)| wanted > 0);
         let bytes = active.map(|(stream, _)| reply_bytes(stream.registers().1)).sum();
         let most = highest_frequency(self.baud, bytes);
@@ -51,8 +51,8 @@ impl Sampler {
     }
 
     /// A stream whose sample is due.
-    pub(crate) fn next_due(&self, now: Instant) -> Option<Stream> {
-        let mut streams = self.timers.iter().zip(Stream::ALL);
+    pub(crate) fn next_due(&self, now: Instant) -> Option<ReportKind> {
+        let mut streams = self.timers.iter().zip(ReportKind::ALL);
         streams.find(|(timer, _)| timer.due <= now).map(|(_, stream)| stream)
     }
 
@@ -64,7 +64,7 @@ impl Sampler {
     }
 
     /// A sample was asked for.
-    pub(crate) fn note_sent(&mut self, now: Instant, stream: Stream) {
+    pub(crate) fn note_sent(&mut self, now: Instant, stream: ReportKind) {
         self.waits = false;
         if let Some(timer) = self.timers.get_mut(stream.index()) {
             timer.advance(now);

@@ -3,7 +3,7 @@
 use protocol_core::time::{Duration, Instant};
 
 use super::own_registers::OwnRegisters;
-use super::stream::{STREAMS, Stream};
+use protocol_core::report_kind::ReportKind;
 
 /// How early a report may come: half of the shortest period of 10 ms.
 const EARLY: Duration = Duration::from_millis(5);
@@ -39,24 +39,24 @@ impl Timer {
 
 /// When the reports of one client are due.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Schedule([Timer; STREAMS]);
+pub(crate) struct Schedule([Timer; ReportKind::ALL.len()]);
 
 impl Default for Schedule {
     fn default() -> Self {
-        Self([Timer::OFF; STREAMS])
+        Self([Timer::OFF; ReportKind::ALL.len()])
     }
 }
 
 impl Schedule {
     /// Sets the frequencies that the client's own registers hold.
     pub(crate) fn set(&mut self, now: Instant, own: &OwnRegisters) {
-        for (timer, stream) in self.0.iter_mut().zip(Stream::ALL) {
+        for (timer, stream) in self.0.iter_mut().zip(ReportKind::ALL) {
             timer.set(now, own.frequency(stream).into());
         }
     }
 
     /// Is a report of the stream due? A report may be half a sample early, so that the mean frequency is kept.
-    pub(crate) fn take_due(&mut self, now: Instant, stream: Stream) -> bool {
+    pub(crate) fn take_due(&mut self, now: Instant, stream: ReportKind) -> bool {
         let Some(timer) = self.0.get_mut(stream.index()) else { return false };
         let is_due = timer.period != Duration::ZERO && timer.due <= now + EARLY;
         if is_due {

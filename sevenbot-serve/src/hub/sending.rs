@@ -12,8 +12,8 @@ use super::line::Owner;
 use super::own_registers::covers;
 use super::request::{WholeRequest, read_bytes, without_idle_ends};
 use super::shares::Shares;
-use super::stream::Stream;
 use super::watchdog::ClientWatchdog;
+use protocol_core::report_kind::ReportKind;
 
 impl Hub {
     /// Sends stops, and what the hub needs to hold the arm. They wait for no other frame.
@@ -166,7 +166,7 @@ impl Hub {
         self.sampler.set_frequencies(now, self.clients.values().map(|client| &client.own));
     }
 
-    fn send_sample(&mut self, now: Instant, stream: Stream) {
+    fn send_sample(&mut self, now: Instant, stream: ReportKind) {
         let (address, count) = stream.registers();
         self.shares.charge(&mut self.sampler.share, read_bytes(count));
         self.sampler.note_sent(now, stream);

@@ -8,7 +8,7 @@
 //! A driven joint that is blocked, let go or silent ends the move, and so do a lost supply and a restart of the controller. The
 //! firmware without status block tells nothing of this.
 
-use protocol_core::registers::map::{MISSING_SERVOS, MOVING_JOINTS, STATUS_VERSION};
+use protocol_core::registers::map::{MISSING_SERVOS, MOVING_JOINTS};
 
 use super::Problem;
 use super::problem::sentences;
@@ -155,7 +155,7 @@ impl MoveCheck {
             registers = all;
         }
         self.0.registers(arm.elapsed(), &registers).map_err(|fault| told(arm, fault))?;
-        Ok(Some(registers).filter(|registers| registers.byte(&STATUS_VERSION) != 0))
+        Ok(Some(registers).filter(Snapshot::has_status_block))
     }
 }
 

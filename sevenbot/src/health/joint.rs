@@ -3,16 +3,17 @@
 use protocol_core::registers::map::{
     BLOCKED_JOINTS, EFFECTOR_TYPE, FINE_POSITION, FINE_TARGET, GRIP_LIMIT, LET_GO_JOINTS, LOAD,
     MEASURED_JOINTS, MISSING_SERVOS, MOTOR_STATE, MOVING_JOINTS, PRESENT_POSITION, TARGET_POSITION, VELOCITY,
-    motor_state,
+    effector, motor_state,
 };
 use protocol_core::registers::{Joint, Register};
 
 use super::problem::ProblemKind;
-use super::told::{CLAW, GRIPPER, ToldBlocks};
 use crate::fine_angle::FineAngle;
 use crate::units::Angle;
 use host_link::Snapshot;
 
+/// The claw. While the effector is a gripper, an obstacle is what it holds.
+pub(super) const CLAW: Option<Joint> = Joint::new(7);
 /// A joint at rest this near to its target is there: under a load a servo stops a few degrees short.
 const AT_TARGET_DEGREES: f64 = 3.0;
 
@@ -46,15 +47,16 @@ pub struct JointHealth {
 }
 
 impl JointHealth {
-    pub(super) fn new(joint: Joint, registers: &Snapshot, told: ToldBlocks) -> Self {
+    pub(super) fn new(joint: Joint, registers: &Snapshot) -> Self {
+        let [is_fine, has_status, is_protected] =
+            [registers.has_extended_block(), registers.has_status_block(), registers.has_protection_block()];
         let bit = |is_told: bool, row: &Register| is_told.then(|| registers.byte(row) & joint.bit() != 0);
-        let tenths = |row: &Register| {
-            told.extended.then(|| f64::from(registers.word(row.of(joint)).cast_signed()) / 10.0)
-        };
-        let (target, position) = if told.extended { fine(joint, registers) } else { whole(joint, registers) };
-        let is_moving = bit(told.status, &MOVING_JOINTS);
-        let is_gripper = CLAW == Some(joint) && registers.byte(&EFFECTOR_TYPE) == GRIPPER;
-        let is_stopped = bit(told.protection, &BLOCKED_JOINTS);
+        let tenths =
+            |row: &Register| is_fine.then(|| f64::from(registers.word(row.of(joint)).cast_signed()) / 10.0);
+        let (target, position) = if is_fine { fine(joint, registers) } else { whole(joint, registers) };
+        let is_moving = bit(has_status, &MOVING_JOINTS);
+        let is_gripper = CLAW == Some(joint) && registers.byte(&EFFECTOR_TYPE) == effector::GRIPPER;
+        let is_stopped = bit(is_protected, &BLOCKED_JOINTS);
         let load_percent = tenths(&LOAD);
         let least_grip = f64::from(registers.byte(&GRIP_LIMIT)) / 2.0;
         let presses = load_percent.is_none_or(|percent| percent.abs() >= least_grip);
@@ -67,10 +69,10 @@ impl JointHealth {
             velocity: tenths(&VELOCITY),
             load_percent,
             is_moving,
-            is_silent: bit(told.status, &MISSING_SERVOS),
+            is_silent: bit(has_status, &MISSING_SERVOS),
             is_blocked: is_stopped.map(|stopped| stopped && !is_gripper),
             is_gripping: is_stopped.map(|stopped| stopped && is_gripper && presses),
-            has_let_go: bit(told.protection, &LET_GO_JOINTS),
+            has_let_go: bit(is_protected, &LET_GO_JOINTS),
             is_at_target: is_near
                 && is_moving != Some(true)
                 && registers.byte(&MOTOR_STATE) == motor_state::SERVO,

@@ -10,12 +10,11 @@
 mod check;
 mod joint;
 mod problem;
-mod told;
 mod watch;
 
 use protocol_core::registers::map::{
     BLOCKED_JOINTS, EFFECTOR_TYPE, FAULTS, FINE_TARGET, LET_GO_JOINTS, MISSING_SERVOS, MOTOR_STATE,
-    PROTECTION, SERVO_ALARMS, SERVO_TEMPERATURE, SUPPLY_LOST, SUPPLY_VOLTAGE, fault, motor_state,
+    PROTECTION, SERVO_ALARMS, SERVO_TEMPERATURE, SUPPLY_LOST, SUPPLY_VOLTAGE, effector, fault, motor_state,
 };
 use protocol_core::registers::{JOINTS, Joint};
 
@@ -25,9 +24,8 @@ use crate::identity::Firmware;
 use crate::joints::JointSnapshot;
 use host_link::{Snapshot, Span};
 
-use told::{CLAW, GRIPPER, ToldBlocks};
-
 pub use check::{MoveCheck, MoveCheckError, MoveState};
+use joint::CLAW;
 pub use joint::JointHealth;
 pub(crate) use problem::{ALARM_BITS, FAULT_BITS};
 pub use problem::{Problem, ProblemKind, remedies, sentences};
@@ -107,19 +105,19 @@ impl Health {
     /// From registers 0 to 255. Those of a block that the firmware does not have are 0.
     #[must_use]
     pub fn new(registers: &Snapshot) -> Self {
-        let told = ToldBlocks::of(registers);
-        let known = |row| told.status.then(|| registers.byte(row)).filter(|&value| value != 0);
-        let guarded = |row| told.protection.then(|| registers.byte(row));
+        let has_status = registers.has_status_block();
+        let known = |row| has_status.then(|| registers.byte(row)).filter(|&value| value != 0);
+        let guarded = |row| registers.has_protection_block().then(|| registers.byte(row));
         Self {
             motor_state: registers.byte(&MOTOR_STATE),
-            joints: Joint::ALL.map(|joint| JointHealth::new(joint, registers, told)),
-            faults: told.status.then(|| registers.byte(&FAULTS)),
+            joints: Joint::ALL.map(|joint| JointHealth::new(joint, registers)),
+            faults: has_status.then(|| registers.byte(&FAULTS)),
             alarms: guarded(&SERVO_ALARMS),
             is_supply_lost: guarded(&SUPPLY_LOST).map(|lost| lost != 0),
             is_protected: guarded(&PROTECTION).map(|on| on != 0),
             supply_volts: known(&SUPPLY_VOLTAGE).map(|tenths| f64::from(tenths) / 10.0),
             hottest_celsius: known(&SERVO_TEMPERATURE),
-            flags: ProblemFlags::of(registers, registers.byte(&EFFECTOR_TYPE) == GRIPPER),
+            flags: ProblemFlags::of(registers, registers.byte(&EFFECTOR_TYPE) == effector::GRIPPER),
         }
     }
 
@@ -177,12 +175,11 @@ struct ProblemFlags {
 impl ProblemFlags {
     /// From registers 195 to 242; 0 where the firmware does not tell. `is_gripper`: register 30.
     fn of(registers: &Snapshot, is_gripper: bool) -> Self {
-        let told = ToldBlocks::of(registers);
-        let guarded = |row| if told.protection { registers.byte(row) } else { 0 };
+        let guarded = |row| if registers.has_protection_block() { registers.byte(row) } else { 0 };
         let grips = CLAW.filter(|_| is_gripper).map_or(0, Joint::bit);
         let blocked = guarded(&BLOCKED_JOINTS);
         Self {
-            silent: if told.status { registers.byte(&MISSING_SERVOS) } else { 0 },
+            silent: if registers.has_status_block() { registers.byte(&MISSING_SERVOS) } else { 0 },
             let_go: guarded(&LET_GO_JOINTS),
             blocked: blocked & !grips,
             is_gripping: blocked & grips != 0,

@@ -11,11 +11,9 @@
 use std::time::Duration;
 
 use protocol_core::registers::map::{
-    EFFECTOR_TYPE, FRAMES_ACCEPTED, MOTOR_STATE, SERVO_TEMPERATURE, SET_POINT_PERIOD, STATUS_VERSION,
-    motor_state,
+    EFFECTOR_TYPE, FRAMES_ACCEPTED, MOTOR_STATE, SERVO_TEMPERATURE, SET_POINT_PERIOD, effector, motor_state,
 };
 
-use super::told::GRIPPER;
 use super::{ALL_JOINTS, Problem, ProblemFlags, ProblemKind};
 use crate::status_block::has_restarted;
 use host_link::sharing::SharingState;
@@ -180,7 +178,7 @@ impl MoveWatch {
         (self.answer_before, self.last_answer, self.unanswered) = (self.last_answer, now, 0);
         let has_state = registers.holds(STATE_REGISTERS);
         if has_state {
-            self.is_gripper = registers.byte(&EFFECTOR_TYPE) == GRIPPER;
+            self.is_gripper = registers.byte(&EFFECTOR_TYPE) == effector::GRIPPER;
         }
         // Problems come before the motor state: a lost supply is the reason why the motors are off.
         if registers.holds(REGISTERS) {
@@ -213,7 +211,7 @@ impl MoveWatch {
     /// Has the controller restarted since the last answer? Then its counter of frames begins again, and its stream is off.
     /// Behind a server another program may have switched the stream off, so only the counter tells.
     fn has_restarted(&mut self, registers: &Snapshot) -> bool {
-        if registers.byte(&STATUS_VERSION) == 0 {
+        if !registers.has_status_block() {
             return false;
         }
         let accepted = registers.counter(&FRAMES_ACCEPTED);
@@ -245,7 +243,7 @@ impl MoveWatch {
 mod tests {
     use super::*;
     use host_link::sharing::FIRST;
-    use protocol_core::registers::map::{MISSING_SERVOS, PROTECTION_VERSION};
+    use protocol_core::registers::map::{MISSING_SERVOS, PROTECTION_VERSION, STATUS_VERSION};
 
     const fn ms(milliseconds: u64) -> Duration {
         Duration::from_millis(milliseconds)

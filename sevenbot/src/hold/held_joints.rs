@@ -1,12 +1,10 @@
 //! The joints of an arm that has to hold: which targets hold them, and which of these were lost.
 
-use protocol_core::registers::map::{
-    EXTENDED_VERSION, FINE_POSITION, FINE_TARGET, LIMITS, STATUS_VERSION, TARGET_POSITION,
-};
+use protocol_core::registers::map::{FINE_POSITION, FINE_TARGET, LIMITS, TARGET_POSITION};
 use protocol_core::registers::{Joint, Register};
 
 use crate::checked_write::{MismatchCause, WriteMismatch, cause_from_counters};
-use crate::fine::{KNOWN_LAYOUT, fine_frames};
+use crate::fine::fine_frames;
 use crate::fine_angle::FineAngle;
 use crate::joints::{JointSnapshot, frames_for};
 use crate::status_block::StatusBlock;
@@ -43,9 +41,8 @@ impl HeldJoints {
     /// From registers 0 to 255. Those of a block that the firmware does not have are 0.
     #[must_use]
     pub fn of(registers: &Snapshot) -> Self {
-        let has = |row| registers.byte(row) == KNOWN_LAYOUT;
-        let status = has(&STATUS_VERSION).then(|| StatusBlock::from(registers.clone()));
-        let fine = has(&EXTENDED_VERSION).then(|| registers.clone());
+        let status = registers.has_status_block().then(|| StatusBlock::from(registers.clone()));
+        let fine = registers.has_extended_block().then(|| registers.clone());
         Self::new(JointSnapshot::new(registers.clone(), status), fine)
     }
 

@@ -1,6 +1,6 @@
 //! Runs a program: tells what it wants, one thing at a time.
 
-use crate::code::{Act, Code, Instruction, Step};
+use crate::code::{Act, Code, Step};
 use crate::command::{CLAW, Command, Sensor, angle, joint_pace, line_speed, timed_pace, wait};
 use crate::compile::compile;
 use crate::fault::{BlockId, ProgramError, ProgramFault};
@@ -82,12 +82,6 @@ impl Interpreter {
     /// Gives the value of the sensor that the program waits for.
     pub fn answer(&mut self, value: Value) {
         self.stack.push(value);
-    }
-
-    /// The block that comes next.
-    #[must_use]
-    pub fn next_block(&self) -> Option<&BlockId> {
-        self.code.instructions.get(self.next).map(|(_, block): &Instruction| block)
     }
 
     fn step(&mut self, step: Step, block: &BlockId) -> Result<Option<Event>, ProgramFault> {

@@ -9,7 +9,7 @@ use web_sys::{Element, PointerEvent, TouchEvent, WheelEvent};
 
 use super::dom::Dom;
 use super::page::{App, Line, on};
-use crate::arm_state::{breach_on_way, breach_text, has_extended_block};
+use crate::arm_state::{breach_on_way, breach_text};
 use crate::scene::{Button, Refusal, Scene, SceneEvent, Unreachable};
 
 /// Listens to pointers and the wheel.
@@ -133,7 +133,7 @@ impl App {
             .filter_map(|&degrees| FineAngle::from_degrees(f64::from(degrees)))
             .flat_map(|angle| angle.hundredths().to_le_bytes())
             .collect();
-        if has_extended_block(self.client.registers()) && values.len() == 14 {
+        if self.client.registers().has_extended_block() && values.len() == 14 {
             self.write(FINE_TARGET.address, &values);
         } else {
             for (joint, degrees) in (1..).zip(angles) {

@@ -11,7 +11,7 @@ use web_sys::{Element, HtmlInputElement};
 
 use super::dom::{Dom, set_attribute, set_text};
 use super::page::{App, Line};
-use crate::arm_state::{ArmState, has_extended_block, misplaced, tip};
+use crate::arm_state::{ArmState, misplaced, tip};
 use crate::source::LineState;
 use crate::texts::Language;
 use crate::words::{Answers, state_line};
@@ -68,7 +68,7 @@ pub(super) fn show(app: &mut App, state: &ArmState) {
     let (dom, language) = (&app.dom, app.language);
     show_joints(dom, language, state);
     if app.client.rounds() >= app.slid_round {
-        let step = if has_extended_block(app.client.registers()) { "0.5" } else { "1" };
+        let step = if app.client.registers().has_extended_block() { "0.5" } else { "1" };
         show_targets(dom, state, step);
     }
     dom.press("motors", &state.motor_state.to_string());

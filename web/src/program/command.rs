@@ -16,7 +16,7 @@ use sevenbot::{Angle, FineAngle, Health, MoveTime, Snapshot, Speed};
 
 use super::failure::ProgramFailure;
 use super::joint_move::JointMove;
-use crate::arm_state::{breach_text, has_extended_block};
+use crate::arm_state::breach_text;
 use crate::client::Client;
 use crate::confirmed::Confirmed;
 use crate::movement::{PlayProgress, PlayRefusal, Player};
@@ -124,7 +124,7 @@ fn set_pace(targets: FineTargets, pace: Pace, now: Instant, client: &mut Client)
 }
 
 fn write_targets(targets: FineTargets, now: Instant, client: &mut Client) -> Action {
-    let frames = if has_extended_block(client.registers()) {
+    let frames = if client.registers().has_extended_block() {
         fine_frames(&targets)
     } else {
         frames_for(&TARGET_POSITION, &targets.map(|target| target.map(|angle| angle.nearest().degrees())))
@@ -141,7 +141,7 @@ fn tip_targets(
 ) -> Result<FineTargets, ProgramFailure> {
     let guard = Guard::default();
     let target = TipTarget::guarded(tip, tool, Some(&guard)).map_err(|refusal| refused_tip(&refusal))?;
-    let fine = target.in_hundredths(tip, tool).filter(|_| has_extended_block(registers));
+    let fine = target.in_hundredths(tip, tool).filter(|_| registers.has_extended_block());
     let whole = target.degrees.map(|degrees| Angle::from_register(degrees).into());
     let [one, two, three, four, five] = fine.map_or(whole, |fine| fine.angles);
     let to = [one, two, three, four, five].map(FineAngle::degrees);
@@ -166,7 +166,7 @@ fn measured(registers: &Snapshot) -> Result<[f64; 5], ProgramFailure> {
 
 /// A straight line from the present targets.
 fn line(tip: Vector, tool: Vector, speed: f64, registers: &Snapshot) -> Result<StraightLine, ProgramFailure> {
-    let is_fine = has_extended_block(registers);
+    let is_fine = registers.has_extended_block();
     let request = StraightLineRequest {
         start: Health::new(registers).joints.map(|joint| joint.target),
         resolution: if is_fine { TargetResolution::Hundredths } else { TargetResolution::Degrees },

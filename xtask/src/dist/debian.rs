@@ -11,7 +11,7 @@ use super::archive::{PackedFile, gzip};
 use super::platform::{Platform, build_directory};
 use super::release::Release;
 use super::tree::DOC;
-use crate::run::{TaskResult, run_command};
+use crate::run::{TaskResult, empty_folder, run_command};
 
 /// The maintainer of the package, unless the variables of Debian's tools name another one.
 const MAINTAINER: &str = "7Bot V2 firmware developers <sevenbot@example.org>";
@@ -42,9 +42,7 @@ pub(super) fn name(release: &Release, debian: &str) -> String {
 pub(super) fn write(release: &Release, platform: Platform, files: &[PackedFile]) -> TaskResult {
     let Some(debian) = platform.debian else { return Ok(()) };
     let folder = build_directory().join("debian").join(debian);
-    if folder.exists() {
-        fs::remove_dir_all(&folder)?;
-    }
+    empty_folder(&folder)?;
     let files = in_debian(files, release)?;
     files.iter().try_for_each(|file| put(&folder, file))?;
     let control = control(release, debian, &files);

@@ -13,7 +13,7 @@ use super::platform::{PLATFORMS, Platform, host_platform};
 use super::release::Release;
 use super::tree::{self, CommonFiles};
 use super::{check, debian, firmware, licences, page, sbom, sums, tools, wheels};
-use crate::run::{TaskResult, target_directory};
+use crate::run::{TaskResult, empty_folder, target_directory};
 use crate::times::Times;
 
 /// Makes everything.
@@ -21,7 +21,7 @@ pub(super) fn make(folder: PathBuf) -> TaskResult {
     // Archives that other tools make keep the permissions of files, which depend on this.
     umask(Mode::from_raw_mode(0o022));
     let release = Release::of_this_commit(folder)?;
-    empty(&release.folder)?;
+    empty_folder(&release.folder)?;
     println!("{}", release.text());
     timed("tools", || tools::python().map(drop))?;
     // Its build fills the time in which a single processor links.
@@ -59,7 +59,7 @@ pub(super) fn make(folder: PathBuf) -> TaskResult {
 pub(super) fn make_native() -> TaskResult<PathBuf> {
     let folder = target_directory().join("dist-native");
     let release = Release { commit: None, ..Release::of_this_commit(folder)? };
-    empty(&release.folder)?;
+    empty_folder(&release.folder)?;
     let built = target_directory().join("debug");
     let common = CommonFiles::new(&built.join("sevenbot"), &licences::text()?)?;
     pack(&release, host_platform()?, &built, &common)?;
@@ -82,13 +82,6 @@ fn pack(release: &Release, platform: Platform, built: &Path, common: &CommonFile
 fn finish(release: &Release) -> TaskResult {
     fs::write(release.path(NOTE), release.note())?;
     sums::write(&release.folder)
-}
-
-fn empty(folder: &Path) -> TaskResult {
-    if folder.exists() {
-        fs::remove_dir_all(folder)?;
-    }
-    Ok(fs::create_dir_all(folder)?)
 }
 
 /// Does a part, and prints how long it took.

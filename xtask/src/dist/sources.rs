@@ -1,17 +1,13 @@
 //! A copy of the sources, for tools that write beside them or need a changed line.
 
-use std::fs;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use crate::run::{TaskResult, root, run_command};
+use crate::run::{TaskResult, empty_folder, root, run_command};
 
 /// Copies the files that git knows, as they are now. A folder that exists is replaced.
 pub(super) fn copy(copy: &Path) -> TaskResult {
-    if copy.exists() {
-        fs::remove_dir_all(copy)?;
-    }
-    fs::create_dir_all(copy)?;
+    empty_folder(copy)?;
     let mut list = Command::new("git");
     let mut list = list.args(["ls-files", "-z"]).current_dir(root()).stdout(Stdio::piped()).spawn()?;
     let files = list.stdout.take().ok_or("git has no output")?;

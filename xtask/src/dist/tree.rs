@@ -18,7 +18,7 @@ use host_sim::cli::Options;
 
 use super::archive::PackedFile;
 use super::platform::{Platform, build_directory, read_program};
-use crate::run::{TaskResult, root, run_command};
+use crate::run::{TaskResult, empty_folder, root, run_command};
 
 /// Gives the arm and its adapter names that stay, and the group `dialout` the right to open them.
 pub(super) const UDEV_RULE: &str = "lib/udev/rules.d/70-sevenbot.rules";
@@ -82,9 +82,7 @@ fn documents(licences: &str) -> TaskResult<Vec<PackedFile>> {
 /// The pages of `sevenbot`, which prints its own, and of `host-sim`.
 fn man_pages(program: &Path) -> TaskResult<Vec<PackedFile>> {
     let folder = build_directory().join("man");
-    if folder.exists() {
-        fs::remove_dir_all(&folder)?;
-    }
+    empty_folder(&folder)?;
     run_command(Command::new(program).args(["man", "--dir"]).arg(&folder))?;
     let mut page = Vec::new();
     Man::new(Options::command().name("host-sim")).render(&mut page)?;

@@ -25,7 +25,7 @@ use wasm_bindgen_cli_support::Bindgen;
 
 use crate::blockly;
 use crate::budget::{self, Figure};
-use crate::run::{BROWSER, TaskResult, cargo, root, run, target_directory};
+use crate::run::{BROWSER, TaskResult, cargo, empty_folder, root, run, target_directory};
 
 /// The profile of the page's module.
 const PROFILE: &str = "web";
@@ -41,9 +41,7 @@ pub(crate) fn build() -> TaskResult {
     run("rustup", &format!("--quiet target add {BROWSER}"), &[])?;
     cargo(&format!("build --quiet --package sevenbot-web --lib --target {BROWSER} --profile {PROFILE}"))?;
     let dist = root().join("web/dist");
-    if dist.exists() {
-        fs::remove_dir_all(&dist)?;
-    }
+    empty_folder(&dist)?;
     copy_folder(&root().join("web/page"), &dist)?;
     bindgen(Bindgen::new().input_path(module(&target_directory())).web(true)?, &dist)?;
     split_module(&dist)?;

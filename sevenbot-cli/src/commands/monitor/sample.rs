@@ -5,7 +5,6 @@ use std::time::{Duration, Instant};
 use sevenbot::cartesian::{TipPose, Vector};
 use sevenbot::fine::FineState;
 use sevenbot::joints::JointSnapshot;
-use sevenbot::map::EXTENDED_VERSION;
 use sevenbot::{Angle, Arm, Error, Health, Joint, StatusBlock};
 
 /// The state of an arm at one time.
@@ -30,8 +29,7 @@ impl ArmSample {
         let round_trip = asked.elapsed();
         let all = arm.with_blocks(&registers)?;
         let health = Health::new(&all);
-        let has_block = all.byte(&EXTENDED_VERSION) == EXTENDED_VERSION.default_at(EXTENDED_VERSION.address);
-        let fine = has_block.then(|| FineState::new(&all));
+        let fine = all.has_extended_block().then(|| FineState::new(&all));
         let status = health.faults.is_some().then(|| StatusBlock::from(all));
         Ok(Self {
             time: start.elapsed(),

@@ -1,8 +1,7 @@
 //! Programs and wheels, installed on a bare system and on this one.
 
-use std::env;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 
 use tempfile::TempDir;
@@ -12,8 +11,9 @@ use crate::dist::contents::archive_name;
 use crate::dist::platform::{PLATFORMS, host_platform};
 use crate::dist::release::Release;
 use crate::dist::{debian, wheels};
-use crate::python::{INTERPRETERS, with_versions};
+use crate::python::OLDEST;
 use crate::run::{TaskResult, run_command};
+use crate::venv;
 
 /// What a user does in the first minute. `$VERSION`: what the programs say of themselves.
 const FIRST_MINUTE: &str = r#"
@@ -103,22 +103,10 @@ pub(super) fn wheels(release: &Release) -> TaskResult {
     let wheel = release.path(&name);
     let root = BareRoot::with(std::slice::from_ref(&wheel))?;
     root.run(&format!("python3 -m venv v\nv/bin/pip install --quiet --no-index /release/{name}\nv/bin/python -c \"{FIRST_PROGRAM}\""))?;
-    pythons()?.iter().try_for_each(|(_, program)| try_wheel(program, &wheel))
-}
-
-/// Each version of Python on PATH, and those of pyenv.
-fn pythons() -> TaskResult<Vec<(String, PathBuf)>> {
-    let mut programs: Vec<_> = INTERPRETERS.iter().map(PathBuf::from).collect();
-    let pyenv = env::var_os("PYENV_ROOT").map(PathBuf::from);
-    if let Some(folder) =
-        pyenv.or_else(|| Some(env::home_dir()?.join(".pyenv"))).map(|at| at.join("versions"))
-        && folder.exists()
-    {
-        for entry in fs::read_dir(folder)? {
-            programs.push(entry?.path().join("bin/python3"));
-        }
-    }
-    Ok(with_versions(programs.into_iter()))
+    venv::of_this_computer()
+        .iter()
+        .filter(|(version, _)| *version >= OLDEST)
+        .try_for_each(|(_, program)| try_wheel(program, &wheel))
 }
 
 fn try_wheel(program: &Path, wheel: &Path) -> TaskResult {
