@@ -147,7 +147,7 @@ mod tests {
         assert_eq!(drain(&mut queue), [2, 3, 6]);
     }
 
-    /// Every start, fill and length of a small queue, beside a queue of the standard library.
+    /// Every start, fill and length of a small queue, compared with a queue of the standard library.
     #[test]
     fn it_keeps_the_order_across_the_end_of_its_array() {
         for (start, fill, count) in

@@ -81,8 +81,8 @@ pub const fn microsecond_prescaler(timer_hz: u32) -> u16 {
     u16::from_be_bytes([high, low])
 }
 
-/// The argument of `cortex_m::asm::delay` for a delay of `micros`, at least. A step of its loop takes three cycles of the core,
-/// although the argument counts as one (cortex-m 0.7.10; subtraction and taken branch of a Cortex-M4).
+/// The argument of `cortex_m::asm::delay` for a delay of at least `micros`. The argument counts steps of a loop, and
+/// each takes three cycles of the core (cortex-m 0.7.10; subtraction and taken branch of a Cortex-M4).
 #[must_use]
 pub const fn delay_steps(core_hz: u32, micros: u32) -> u32 {
     const CYCLES_PER_STEP: u32 = 3;

@@ -45,7 +45,8 @@ pub fn identify(khz: u32, fitted: &[u8]) -> Option<u8> {
 /// True if the PLL can use each of these crystals, in MHz, and a measurement tells them apart.
 #[must_use]
 pub const fn are_distinct(fitted: &[u8]) -> bool {
-    // Indices, because a constant expression has no iterators. Crystals have 4 to 26 MHz (DS8626, HSE oscillator).
+    // Slice patterns, because a constant expression has no iterators. Crystals have 4 to 26 MHz (DS8626, HSE
+    // oscillator).
     let mut rest = fitted;
     let mut lowest = 4;
     while let [mhz, behind @ ..] = rest {

@@ -1,5 +1,5 @@
-//! The log of the main loop. defmt-rtt masks all interrupts for a whole line, so lines are written in pauses of both serial
-//! lines, one for each pass of the loop.
+//! The log of the main loop. defmt-rtt masks all interrupts for a whole line, so log lines are written while both
+//! serial lines pause, at most one in each pass of the loop.
 
 use cortex_m::peripheral::DCB;
 use firmware_stm32::chip::host_link::HostLink;

@@ -12,7 +12,7 @@ pub struct Question {
     length: u8,
 }
 
-/// The first id that no servo of this arm has.
+/// The first of the ids that stand for absent servos. The servos of this arm have ids 0 to 6.
 const FIRST_ABSENT_ID: u8 = 8;
 /// How many ids there are from there up to 253. 254 is the broadcast id.
 const ABSENT_IDS: u16 = 246;

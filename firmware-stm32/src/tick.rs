@@ -6,7 +6,7 @@ use protocol_core::time::Duration;
 /// Period of the tick, in microseconds.
 pub const TICK_MICROS: u32 = 1_000;
 
-/// The period of the system timer for `wait`, in cycles of which a microsecond has `per_micro`. `None` if the usual tick
+/// The period of the system timer for `wait`, in cycles; a microsecond has `per_micro` cycles. `None` if the usual tick
 /// comes within `wait`.
 #[must_use]
 pub const fn cycles(wait: Duration, per_micro: u32) -> Option<u32> {

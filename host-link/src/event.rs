@@ -9,7 +9,7 @@ use protocol_core::wire::frame::Defect;
 use crate::snapshot::Snapshot;
 use crate::span::Span;
 
-/// A read of one link.
+/// Identifies a read of one link.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct RequestId(u64);
 
@@ -33,11 +33,12 @@ pub enum HostEvent {
     Report(Map, Snapshot),
     /// An alarm of the arm ([M8](protocol_core::decisions#m8)).
     Alarm(Alarm),
-    /// A good frame that answers no open read: a late reply, or the echo of a request on a one-wire line. An echo of a
-    /// read holds no values.
+    /// A good frame that answers no open read: a late reply, or the echo of a write on a one-wire line. The echo of a
+    /// read lacks the values of a reply, so it is [`HostEvent::Damaged`].
     Unmatched(Function, Snapshot),
     /// A frame was damaged.
     Damaged(Defect),
-    /// Nothing happens before this time, unless bytes come. Hand over at that time what came, if only an empty slice.
+    /// Nothing happens before this time, unless bytes come. At that time, pass the bytes that came to
+    /// [`HostLink::bytes`](crate::HostLink::bytes), or an empty slice.
     Wait(Instant),
 }

@@ -9,9 +9,9 @@
 //!   bytes ──▶ Deframer ┴──────────────────────────────────▶ Report, Alarm, Unmatched, Damaged
 //! ```
 //!
-//! It reads no clock and opens no port: time and bytes are arguments. The blocking library, the hub of `sevenbot serve` and
-//! the page in a browser are shells round it. It does not know what the registers of the arm mean, but
-//! for two things that all of them share: the registers of a server ([`sharing`]), and the limits that a stop has to keep
+//! It reads no clock and opens no port: time and bytes are arguments. The blocking library, the hub of `sevenbot serve`
+//! and the page in a browser are shells round it. It does not know what the registers of the arm mean, except for two
+//! things that all shells share: the registers of a server ([`sharing`]), and the limits that a stop has to keep
 //! ([`keep_limits`]).
 //!
 //! ```

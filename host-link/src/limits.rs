@@ -1,7 +1,8 @@
 //! The targets that hold an arm, within its limits ([D25](protocol_core::decisions#d25)).
 //!
-//! An arm refuses a frame of targets whole if one is against a limit, even if a joint was measured there: a joint that moves is some
-//! degrees off its set-point. A stop that wrote such positions would stop no joint at all.
+//! An arm refuses a whole frame of targets if one is against a limit, even if a joint was measured there: a moving
+//! joint is some degrees off its set-point. If a stop wrote such measured positions, the arm would refuse it and stop
+//! no joint.
 
 use protocol_core::registers::JOINTS;
 use protocol_core::registers::map::limit;
@@ -9,11 +10,11 @@ use protocol_core::registers::map::limit;
 /// Hundredths of a degree in a degree.
 const DEGREE: u16 = 100;
 
-/// Brings the targets that hold an arm within its limits. All are in hundredths of a degree: `present` are those that the arm has,
-/// and `written` those that are to be written. `limits` is register 188.
+/// Brings the targets that hold an arm within its limits. All are in hundredths of a degree: `present` holds the
+/// targets of the arm, and `written` the targets that are to be written. `limits` is register 188.
 ///
-/// The joint that was on its way inwards goes on until the linkage allows the pair. Where neither target of a pair changes, none is
-/// written: the arm was outside before, and holds there.
+/// The joint that was on its way inwards goes on until the linkage allows the pair. Targets that would not change are
+/// not written: the arm was outside before, and holds there.
 pub fn keep_limits(limits: u8, present: &[u16; JOINTS], written: &mut [Option<u16>; JOINTS]) {
     let [_, two, three, .., seven] = written;
     let &[_, two_now, three_now, .., seven_now] = present;

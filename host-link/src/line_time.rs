@@ -2,15 +2,15 @@
 
 use protocol_core::time::{Duration, Instant};
 
-/// Before replies have come, one may be this much later than the line explains. A USB adapter holds bytes back for up to 16 ms in
-/// each direction (the latency timer of FTDI chips). An arm answers within a control cycle of 10 ms. The rest is for a busy
-/// host, or a server with other clients.
+/// Before the first reply, a reply may be this much later than the time on the line explains. A USB adapter holds bytes
+/// back for up to 16 ms in each direction (the latency timer of FTDI chips). An arm answers within a control cycle of
+/// 10 ms. The rest is for a busy host, or a server with other clients.
 pub const ROUND_TRIP: Duration = Duration::from_millis(100);
-/// Where replies come in time, one may still be this much later.
+/// The shortest allowance: a reply may be this much later than due even if all others came in time.
 const SHORTEST: Duration = Duration::from_millis(4);
 /// Microseconds of ten bits, a byte with start and stop bit, at 1 bit/s.
 const BYTE: u64 = 10_000_000;
-/// With each reply in time, this part of the allowance is forgotten.
+/// Each reply that comes in time shortens the allowance by 1/8.
 const FORGETTING: u64 = 8;
 
 /// The time that bytes take on a line; `baud` is in bits per second.
@@ -50,7 +50,8 @@ impl LineTime {
         self.allowance
     }
 
-    /// A reply came that was due at this time. A greater lateness counts at once, and is forgotten over some ten replies.
+    /// A reply that was due at `due` came at `now`. A longer delay counts at once, and is forgotten over some ten
+    /// replies.
     pub(crate) fn note_reply(&mut self, due: Instant, now: Instant) {
         let forgotten = self.allowance.as_micros() / FORGETTING;
         let allowance = self.allowance.as_micros().saturating_sub(forgotten);

@@ -21,8 +21,8 @@ use crate::span::Span;
 pub struct LinkOptions {
     /// Baud rate of the line to the arm.
     pub baud: u32,
-    /// The registers that a report of map 2.2 may have ([D26](protocol_core::decisions#d26)). A report looks like the reply
-    /// to a read of these, so no read asks for exactly these.
+    /// The ranges of registers that a report of map 2.2 may have ([D26](protocol_core::decisions#d26)). A report looks
+    /// like the reply to a read of its range, so no read asks for exactly one of these.
     pub reports: &'static [Span],
 }
 
@@ -231,7 +231,7 @@ impl HostLink {
     }
 
     /// The reply to a later read came first, so this one is lost ([D5](protocol_core::decisions#d5)). It is repeated at
-    /// once, if it may be and was not.
+    /// once if a repeat is allowed and none is on its way.
     fn lose(&mut self, id: RequestId) {
         if self.pending.awaits(id) {
             return;

@@ -8,15 +8,16 @@ use crate::event::RequestId;
 use crate::line_time::ROUND_TRIP;
 use crate::span::Span;
 
-/// How long the reply to a read is waited for, and whether it is repeated meanwhile.
+/// How long to wait for the reply to a read, and whether to repeat the read meanwhile.
 ///
-/// A read is repeated as soon as its reply is later than replies were lately ([`ROUND_TRIP`] before there were any). The time
-/// to the next repeat doubles, up to [`ROUND_TRIP`] or what was learned, whichever is longer. A read changes nothing, so a
-/// needless one does no harm. It is given up after `timeout` for each attempt, counted from the time when its reply was due.
-/// So a lost reply costs little, several are no error, and a slow arm gets all of the time.
+/// A read is repeated as soon as its reply is later than replies were lately ([`ROUND_TRIP`] before there were any).
+/// The time to the next repeat doubles, up to [`ROUND_TRIP`] or what was learned, whichever is longer. A read changes
+/// nothing, so a needless one does no harm. It is given up after `timeout` for each attempt, counted from the time when
+/// its reply was due. So a lost reply costs little time, several lost replies are no error, and a slow arm gets the
+/// whole time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Patience {
-    /// How many times `timeout` the reply is waited for, at least once. A read with one attempt is sent once.
+    /// The wait for the reply lasts this many times `timeout`, at least once. A read with one attempt is not repeated.
     pub attempts: u32,
     /// The longest wait for one attempt, in addition to the time on the line.
     pub timeout: Duration,
@@ -76,7 +77,7 @@ impl OpenRead {
         self.patience.repeats() && self.writes_before == writes
     }
 
-    /// Repeating makes no sense, or not yet: wait until it is given up.
+    /// The read is not repeated any more: wait until it is given up.
     fn wait_to_the_end(&mut self) {
         self.due = self.give_up_at.unwrap_or(self.due);
     }

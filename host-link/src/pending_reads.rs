@@ -15,7 +15,8 @@ use protocol_core::time::Instant;
 use crate::event::RequestId;
 use crate::span::Span;
 
-/// At most this many reads that were given up are remembered: those of some ten seconds without a reply. No reply is later.
+/// At most this many reads that were given up are remembered: as many as are sent in some ten seconds without a reply.
+/// No reply is later than that.
 const REMEMBERED: usize = 64;
 
 /// A read that was sent.
@@ -24,7 +25,7 @@ struct SentRead {
     /// `None` once it was given up.
     id: Option<RequestId>,
     asked: Span,
-    /// When its reply is there, if the arm answers at once.
+    /// When its reply has arrived, if the arm answers at once.
     due: Instant,
 }
 
@@ -39,14 +40,15 @@ pub(crate) struct Matched {
     pub(crate) id: Option<RequestId>,
     /// When the reply was due.
     pub(crate) due: Instant,
-    /// Reads that were sent before that one, oldest first: these replies are lost.
+    /// Reads that were sent before that one, oldest first: their replies are lost.
     pub(crate) lost: Vec<RequestId>,
 }
 
 impl PendingReads {
-    /// The range to ask for: one that holds `wanted`, and that neither a pending read nor one of `reports` has. Where no range
-    /// is left, it is that of an earlier attempt of the same read, or of a read that was given up: the first reply then counts
-    /// as that of the earlier one. `None` while another read has the only range.
+    /// The range to ask for: one that holds `wanted`, and that neither a pending read nor one of `reports` has. If no
+    /// such range is left, it is `wanted` itself, which an earlier attempt of the same read has, or a read that was
+    /// given up: the first reply then counts for the earlier one. `None` while another open read has asked for
+    /// `wanted`.
     pub(crate) fn range_for(&self, id: RequestId, wanted: Span, reports: &[Span]) -> Option<Span> {
         let is_free = |span: &Span| !reports.contains(span) && !self.has(span, |_| true);
         let wider = (0..=u8::MAX).map_while(|by| wanted.widened(by)).find(is_free);

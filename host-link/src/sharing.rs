@@ -13,8 +13,9 @@ pub const FIRST: u8 = 232;
 const COMMAND: u8 = 239;
 /// The value of register 232: the version of the layout of this block.
 const VERSION: u8 = 1;
-/// The weight draws a joint that has reached its target so far off it at most, in hundredths of a degree. A stop may leave such a
-/// joint its target ([D24](protocol_core::decisions#d24)), and what draws it further is an obstacle.
+/// The largest distance that its weight draws a joint off a target that it has reached, in hundredths of a degree. A
+/// stop may leave the target of such a joint unchanged ([D24](protocol_core::decisions#d24)). A joint that is farther
+/// off is at an obstacle.
 pub const DROOP: u16 = 150;
 
 /// Are all these registers the server's?
@@ -27,7 +28,7 @@ pub const fn is_own(address: u8, count: u8) -> bool {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum DrivenBy {
-    /// Nobody.
+    /// No program wrote targets within the last second.
     #[default]
     Nobody = 0,
     /// The program that reads.

@@ -1,4 +1,4 @@
-//! A link in front of a line that is lost, damaged or late, in virtual time.
+//! A link on a line on which replies are lost, damaged or late, in virtual time.
 
 #![allow(clippy::expect_used, clippy::indexing_slicing, clippy::panic)] // A panic is a failed test.
 
@@ -189,7 +189,7 @@ fn a_read_is_not_repeated_behind_a_write() {
 fn a_write_ahead_goes_before_a_read_that_waits_and_before_all_that_is_queued() {
     let mut link = link(115_200);
     let patience = Patience { attempts: 1, timeout: Duration::from_millis(500) };
-    // The second read waits for the only range, and everything queued behind it.
+    // The second read waits for the only range, and everything queued behind it waits, too.
     for _ in 0..2 {
         link.read(span(0, 255), patience);
     }

@@ -20,7 +20,7 @@ fn new_link() -> HostLink {
     HostLink::new(LinkOptions { baud: 115_200, reports: &[REPORT] })
 }
 
-/// Also ranges that cannot be widened.
+/// Ranges of registers. Some cannot be widened.
 fn spans() -> impl Strategy<Value = Span> {
     let usual = [(54, 7), (0, 8), (10, 4), (10, 5), (240, 16), (0, 255), (1, 255), (0, 0)];
     proptest::sample::select(
@@ -124,7 +124,7 @@ struct World {
     arm: Arm,
     now: Instant,
     writes: u8,
-    /// The writes before each read without an end.
+    /// The range of each open read, and the number of writes before it.
     open: BTreeMap<RequestId, (Span, u8)>,
     answered: usize,
 }

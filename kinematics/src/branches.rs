@@ -10,26 +10,26 @@ use crate::inverse::{NoSolution, direction, ik5, ik6, in_plane, roll_and_bend};
 use crate::limits::joint_angle;
 use crate::vector::Vector;
 
-/// All angles of joints 1 to 3, in degrees, that bring the wrist to a point in millimetres. The first is that of
-/// [`ik5`]. The second has joint 1 at the opposite end.
+/// All angles of joints 1 to 3, in degrees, that bring the wrist to a point in millimetres. The first solution is the one
+/// of [`ik5`]. The second has joint 1 at the opposite end.
 ///
 /// # Errors
 ///
-/// Those of [`ik5`].
+/// The same as [`ik5`].
 pub fn ik5_all<F: Float>(wrist: Vector<F>) -> Result<[Option<[F; 3]>; 2], NoSolution> {
     let first = ik5(wrist)?;
     Ok([Some(first), other_heading(wrist, first)])
 }
 
 /// All angles of joints 1 to 5, in degrees, that bring the tip to a point in millimetres and point the tool in a
-/// direction of any length. The first is that of [`ik6`]. The second has joint 4 at the opposite end. The other two have
-/// joint 1 at the opposite end.
+/// direction of any length. The first solution is the one of [`ik6`]. The second has joint 4 at the opposite end. The
+/// other two have joint 1 at the opposite end.
 ///
 /// Where the tool is in line with the forearm, joint 4 may have any angle. It gets 90 degrees.
 ///
 /// # Errors
 ///
-/// Those of [`ik6`].
+/// The same as [`ik6`].
 pub fn ik6_all<F: Float>(tip: Vector<F>, tool: Vector<F>) -> Result<[Option<[F; 5]>; 4], NoSolution> {
     let [t1, t2, t3, t4, t5] = ik6(tip, tool)?;
     let tool = direction(tool, NoSolution::NoToolDirection)?;

@@ -35,8 +35,8 @@ pub trait Float:
     #[must_use]
     fn atan2_radians(self, x: Self) -> Self;
 
-    /// The larger of two numbers, `other` where they are equal: the larger of -0 and `0` is 0. The `max` of the standard
-    /// library gives either, depending on the machine.
+    /// The larger of two numbers; `other` where they are equal, so -0 becomes 0 if `other` is 0. The `max` of the
+    /// standard library gives either zero, depending on the machine.
     #[must_use]
     fn larger(self, other: Self) -> Self {
         if self > other { self } else { other }
@@ -66,8 +66,8 @@ pub trait Float:
 }
 
 /// Sine and cosine of at most 45 degrees by their Taylor series, up to the 16th power: what is left out is below the
-/// rounding of `f64`. Those of `libm` compute with `f64` even for `f32`. The chip does that in software: `forward` would
-/// take 14,538 instructions instead of 899, and 6 KiB more flash.
+/// rounding of `f64`. The functions of `libm` compute with `f64` even for `f32`. The chip does that in software:
+/// `forward` would take 14,538 instructions instead of 899, and 6 KiB more flash.
 fn sin_cos_to_45<F: Float>(degrees: F) -> (F, F) {
     let one = F::of(1.0);
     let radians = degrees * F::of(core::f64::consts::PI / 180.0);

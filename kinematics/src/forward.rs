@@ -1,6 +1,6 @@
 //! Forward kinematics: where every part of the arm is, from the angles of its joints.
 //!
-//! Knows no limits: any angles give frames.
+//! This file knows no limits: any angles give frames.
 
 use crate::float::Float;
 use crate::geometry::{
@@ -35,7 +35,7 @@ pub struct ArmFrames<F> {
 /// Points in millimetres and directions of the hand, which joints 4 to 6 move.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HandFrames<F> {
-    /// The forearm's normal turned by joint 4. The hand bends in the plane of it and the forearm.
+    /// The forearm's normal turned by joint 4. The hand bends in the plane of this direction and the forearm.
     pub bend: Vector<F>,
     /// Direction of the tool: from the wrist to the tip.
     pub tool: Vector<F>,
@@ -103,7 +103,7 @@ impl<F: Float> ArmFrames<F> {
 }
 
 impl<F: Float> HandFrames<F> {
-    /// The frames at these angles of joints 4 to 6, in degrees, on an arm that is there.
+    /// The frames of a hand on `arm`, at these angles of joints 4 to 6, in degrees.
     #[must_use]
     pub fn of(arm: &ArmFrames<F>, [t4, t5, t6]: [F; 3]) -> Self {
         let (sine, cosine) = t4.sin_cos();

@@ -19,7 +19,7 @@ use crate::geometry::{
 use crate::limits::{TOLERANCE, joint_angle};
 use crate::vector::Vector;
 
-/// A wrist that is nearer to the base axis, in mm, has no heading.
+/// A wrist that is nearer than this to the base axis, in mm, has no heading.
 pub(crate) const NO_HEADING: f64 = 0.001;
 
 /// Why no angles of the joints reach a position.
@@ -49,7 +49,8 @@ pub enum NoSolution {
 ///
 /// # Errors
 ///
-/// Why there are none with the arm towards the point: the distance, then joint 1, then joints 2 and 3.
+/// Why the arm does not reach the point with its heading towards it. The first reason counts: a number that is not
+/// finite, no heading, the distance, joint 2, joint 3, joint 1.
 pub fn ik5<F: Float>(wrist: Vector<F>) -> Result<[F; 3], NoSolution> {
     with_either_heading(wrist, Ok)
 }
@@ -57,26 +58,28 @@ pub fn ik5<F: Float>(wrist: Vector<F>) -> Result<[F; 3], NoSolution> {
 /// The angles of joints 1 to 5, in degrees, that bring the tip to a point in millimetres and point the tool in a
 /// direction of any length.
 ///
-/// Where y of the wrist is 0 and both headings lead there, the solution faces it if the hand can point there then.
-/// Where the tool is in line with the forearm, joint 4 may have any angle, and gets 90 degrees. Where the hand bends
-/// to the side, joint 4 may be 0 or 180 degrees, and gets the one with joint 5 below 90.
+/// Where y of the wrist is 0 and both headings lead there, the solution faces the wrist, if the hand can then point the
+/// tool in that direction. Where the tool is in line with the forearm, joint 4 may have any angle, and gets 90 degrees.
+/// Where the hand bends to the side, joint 4 may be 0 or 180 degrees, and gets the one with joint 5 below 90.
 ///
 /// # Errors
 ///
-/// Why there are none.
+/// [`NoSolution::NoToolDirection`] for a direction of zero, the reasons of [`ik5`] for the wrist, or
+/// [`NoSolution::ToolDirection`] if the hand cannot point there.
 pub fn ik6<F: Float>(tip: Vector<F>, tool: Vector<F>) -> Result<[F; 5], NoSolution> {
     let Reach { arm: [t1, t2, t3], hand: [t4, t5], .. } = Reach::of(tip, tool)?;
     Ok([t1, t2, t3, t4, t5])
 }
 
 /// The angles of joints 1 to 6, in degrees, that bring the tip to a point in millimetres, point the tool in a direction
-/// of any length, and turn the disc in that of `disc`, as far as it is at right angles to the tool.
+/// of any length, and turn the disc in the direction of `disc`. Only the part of `disc` at right angles to the tool
+/// counts.
 ///
 /// A claw is the same after half a turn, so joint 6 gets 0 to 180 degrees and the disc may point the opposite way.
 ///
 /// # Errors
 ///
-/// Why there are none.
+/// The reasons of [`ik6`], or [`NoSolution::NoDiscDirection`].
 pub fn ik7<F: Float>(tip: Vector<F>, tool: Vector<F>, disc: Vector<F>) -> Result<[F; 6], NoSolution> {
     let Reach { arm: [t1, t2, t3], hand: [t4, t5], frames } = Reach::of(tip, tool)?;
     let disc = direction(disc, NoSolution::NoDiscDirection)?;
@@ -179,7 +182,7 @@ fn joint<F: Float>(number: u8, degrees: F) -> Result<F, NoSolution> {
     joint_angle(degrees).ok_or(NoSolution::Joint(number))
 }
 
-/// Smaller components of a direction of length 1 are rounding.
+/// Smaller components of a direction of length 1 are rounding errors.
 fn rounding<F: Float>() -> F {
     F::EPSILON * F::of(16.0)
 }

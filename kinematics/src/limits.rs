@@ -1,6 +1,6 @@
 //! Which angles the arm can take: each joint, the parallelogram of joints 2 and 3, and the claw.
 //!
-//! Limits belong to the range. Because of rounding, a solution may be beyond one by [`TOLERANCE`].
+//! An angle at a limit is legal. Because of rounding, a solution may be beyond a limit by [`TOLERANCE`].
 
 use crate::float::Float;
 use crate::geometry::{CLAW_MAX, JOINT_MAX, LEVEL_FOREARM, LINKAGE_MAX, LINKAGE_MIN};
@@ -20,14 +20,14 @@ pub enum LimitBroken {
     Claw,
 }
 
-/// The angle that the parallelogram limits: that of the rear arm above the line of the forearm, in degrees, from the
-/// angles of joints 2 and 3.
+/// The angle that the parallelogram limits: the angle of the rear arm above the line of the forearm, in degrees, from
+/// the angles of joints 2 and 3.
 #[must_use]
 pub fn linkage<F: Float>(t2: F, t3: F) -> F {
     t3 - F::of(LEVEL_FOREARM) + t2
 }
 
-/// Checks the angles of joints 1 to 7, in degrees. With a suction cup, joint 7 is outside nothing: see [`check_arm`].
+/// Checks the angles of joints 1 to 7, in degrees. With a suction cup, joint 7 has no such limit: use [`check_arm`].
 ///
 /// # Errors
 ///

@@ -9,7 +9,7 @@
 //! ```
 //!
 //! The cylinder of the base has no lower end: below the foot is the support of the base. The turret above the base
-//! needs no check: the linkage keeps the wrist 106 mm from the shoulder, and the elbow is never below it.
+//! needs no check: the linkage keeps the wrist 106 mm from the shoulder, and the elbow is never below the shoulder.
 //!
 //! This file knows neither paths nor joint limits. [`crate::limits`] checks those.
 
@@ -26,9 +26,10 @@ pub const KEEP_OUT_RADIUS: f64 = BASE_RADIUS + BASE_MARGIN;
 pub const KEEP_OUT_TOP: f64 = BASE_MARGIN;
 /// Steps of the search for the deepest point of a segment. Each leaves two thirds of it: 200 mm / 1.5^30 is 1 um.
 const SEARCH_STEPS: u32 = 30;
-/// The directions from the tip to the points of the disc's edge that are checked, in eighths of a turn. Between two of
-/// them the edge is up to 1.5 mm further out.
+/// Sine and cosine of an eighth of a turn.
 const EIGHTH: f64 = core::f64::consts::FRAC_1_SQRT_2;
+/// Directions from the tip to the checked points of the disc's edge, an eighth of a turn apart. Between two of these
+/// points the edge is up to 1.5 mm further out.
 const EDGE: [[f64; 2]; 8] = [
     [1.0, 0.0],
     [EIGHTH, EIGHTH],
@@ -212,7 +213,7 @@ mod tests {
     fn the_line_of_the_forearm_is_checked_between_its_ends() {
         let (from, to) = (Vector::new(0.0, 60.0, 150.0), Vector::new(0.0, 100.0, -50.0));
         assert!(distance_from_base(from) > 0.0 && distance_from_base(to) > 0.0);
-        // At z = 10 the line is 88 mm from the axis; 4.4 mm lower it is 0.88 mm further.
+        // At z = 10 the line is 85 mm from the axis, inside the radius of 88 mm. It is deepest at z = 7.6: by 2.4 mm.
         let crossing = segment_from_base(Vector::new(0.0, 50.0, 150.0), to);
         let dense = (0..=100_000).map(|step| {
             let share = f64::from(step) / 1e5;

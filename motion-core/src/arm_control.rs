@@ -88,7 +88,8 @@ impl ArmControl {
         }
     }
 
-    // Not inlined, as other functions here: most polls do not call it, and would save the registers that it uses.
+    // Not inlined, like other functions here: most polls do not call it, but with it inlined all would save its CPU
+    // registers.
     #[inline(never)]
     fn begin_cycle(&mut self, now: Instant, end: Instant) {
         self.bus.begin_cycle(end);
@@ -204,13 +205,13 @@ impl ArmControl {
         self.joints.against_limit(&LimitCheck { accepted, reached, limits })
     }
 
-    /// Refuses a write, which changes no report frequency.
+    /// Refuses a write. Returns `false`, because a refused write changes no report frequency.
     fn refuse(&mut self, reason: u8, address: u8) -> bool {
         Status::refuse(&mut self.registers, reason, address);
         false
     }
 
-    /// Returns whether a write changes settings. Refuses it and returns `None` if the storage is full.
+    /// Returns whether a write changes settings. If it does and the storage is full, refuses it and returns `None`.
     fn check_storage(&mut self, accepted: &Accepted<'_>) -> Option<bool> {
         let changed_setting = self.registers.first_changed_setting(accepted);
         if let (Some(setting), Storage::Full) = (changed_setting, self.status.storage()) {
@@ -224,7 +225,7 @@ impl ArmControl {
     fn execute(&mut self, now: Instant, accepted: &Accepted<'_>, changes_settings: bool) {
         // Before the rest of the frame, so that a target in it replaces the measured position (D13).
         self.set_motor_state(accepted);
-        // A new period counts from the next point on (D23), also behind points in its frame.
+        // A new period counts from the next point on (D23): points in the same frame still use the old one.
         let period = self.registers.word(SET_POINT_PERIOD.address);
         self.apply(accepted, changes_settings);
         self.joints.set_targets(now, accepted, period, &mut self.registers);
@@ -235,7 +236,8 @@ impl ArmControl {
         Status::show_moving(&mut self.registers, &self.joints);
     }
 
-    /// Executes what only the extended block and the protection block have.
+    /// Applies the registers of the extended block and the protection block that act at once: watchdog and protection
+    /// switch.
     fn execute_extended(&mut self, now: Instant, accepted: &Accepted<'_>) {
         if let Some(value) = accepted.value_at(HOST_WATCHDOG.address) {
             self.watchdog.set(now, value);
@@ -334,13 +336,14 @@ impl ArmControl {
         self.status.show_faults(&mut self.registers, &self.joints);
     }
 
-    /// Raises fault bits until the next restart.
+    /// Raises fault bits. They stay until the next restart, but [`fault::HOST_SILENT`] only until register 186 is
+    /// written.
     pub(crate) fn raise_faults(&mut self, bits: u8) {
         self.status.raise_faults(bits);
         self.status.show_faults(&mut self.registers, &self.joints);
     }
 
-    /// Shows the registers of the extended block as they are now.
+    /// Updates the registers of the extended block and the protection block. It is called only before they are sent.
     pub(crate) fn show_extended(&mut self) {
         self.joints.show_extended(&mut self.registers);
     }

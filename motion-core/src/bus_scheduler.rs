@@ -23,7 +23,8 @@ use crate::servo_bus::{Bus, Outcome};
 const START_UP_TIME: Duration = Duration::from_millis(500);
 /// The torque switches are set again after this many control cycles, in case a frame was lost.
 const TORQUE_REFRESH_CYCLES: u8 = 25;
-/// A torque switch is refreshed only if it was read on at most this many cycles before ([D28](protocol_core::decisions#d28)):
+/// This many cycles before a refresh, the scheduler begins to read the torque switches that were not read since the
+/// last one: a switch is refreshed only if a read showed it on ([D28](protocol_core::decisions#d28)). The time is
 /// enough for a bus on which a question takes 16 ms.
 const TORQUE_READ_CYCLES: u8 = 12;
 
@@ -35,7 +36,7 @@ pub(crate) struct BusScheduler {
     /// When start-up ends at the latest; `None` once it is over.
     starting_until: Option<Instant>,
     next_cycle: Instant,
-    /// How often the goals are still to be sent.
+    /// How many more times the goals have to be sent.
     goals_due: u8,
     /// A joint engaged, and its goal was not sent yet.
     has_new_goal: bool,
@@ -97,7 +98,7 @@ impl BusScheduler {
         self.starting_until.is_some()
     }
 
-    /// Ends start-up once every joint is measured or its time is over. Returns whether this call ended it.
+    /// Ends start-up once every joint is measured or [`START_UP_TIME`] is over. Returns whether this call ended it.
     pub(crate) fn end_start_up(&mut self, now: Instant, joints: &Joints) -> bool {
         let is_over = self.starting_until.is_some_and(|until| now >= until || joints.silent() == 0);
         if is_over {
@@ -114,7 +115,7 @@ impl BusScheduler {
         self.left_to_read += 1;
     }
 
-    /// Schedules goals, this often, then torque.
+    /// Schedules the goals, `goals` times, then torque.
     pub(crate) fn torque_due_after(&mut self, goals: u8) {
         self.goals_due = self.goals_due.max(goals);
         self.torque_due = true;
@@ -125,8 +126,8 @@ impl BusScheduler {
         self.torque_due = true;
     }
 
-    /// When the control cycle was due that has to begin at `now`; `None` before it is due. At most one missed cycle is
-    /// repeated: a late call makes motion late, not fast.
+    /// The time at which the next control cycle was due; `None` if it is not due yet. A late call repeats at most one
+    /// missed cycle: motion becomes late, not faster.
     pub(crate) fn cycle_due(&self, now: Instant) -> Option<Instant> {
         (now >= self.next_cycle).then(|| self.next_cycle.max(earlier(now, CYCLE)))
     }

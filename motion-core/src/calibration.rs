@@ -5,8 +5,8 @@
 //! ```
 //!
 //! The constants come from the maker's published firmware. As in that firmware, the offset
-//! ([D9](protocol_core::decisions#d9)) applies on the servo's side of the reversal. The arithmetic uses thousandths of a
-//! degree in 32-bit integers; one count is at least 212 of them. This file does not know targets.
+//! ([D9](protocol_core::decisions#d9)) applies on the servo's side of the reversal. The arithmetic uses thousandths of
+//! a degree in 32-bit integers; one count is 212 or 288 of them. This file does not know targets.
 
 use protocol_core::registers::Joint;
 
@@ -27,7 +27,7 @@ impl MicroDegrees {
         Self(degrees as i32 * Self::PER_DEGREE)
     }
 
-    /// The nearest angle to this many degrees, which are at most 2147.
+    /// The nearest angle to this many degrees. It saturates beyond 2147 degrees in either direction.
     #[must_use]
     #[expect(clippy::cast_possible_truncation, reason = "the conversion saturates")]
     pub fn nearest(degrees: f32) -> Self {
@@ -135,8 +135,8 @@ pub fn angle_from_counts(joint: Joint, counts: u16, offset_degrees: i8) -> Micro
     MicroDegrees(mounting.reverse(seen) * 1_000)
 }
 
-/// The velocity of a joint in tenths of a degree per second, positive towards greater angles. `velocity` is that of its
-/// servo in counts per second.
+/// The velocity of a joint in tenths of a degree per second, positive towards greater angles. `velocity` is the
+/// velocity of the servo in counts per second.
 #[must_use]
 pub fn velocity_from_servo(joint: Joint, velocity: i16) -> i16 {
     let mounting = Mounting::of(joint);
@@ -145,7 +145,7 @@ pub fn velocity_from_servo(joint: Joint, velocity: i16) -> i16 {
     i16::try_from(if mounting.reversed { -velocity } else { velocity }).unwrap_or(0)
 }
 
-/// The load of a joint, positive towards greater angles. `load` is that of its servo, positive towards more counts.
+/// The load of a joint, positive towards greater angles. `load` is the load of the servo, positive towards more counts.
 #[must_use]
 pub const fn load_from_servo(joint: Joint, load: i16) -> i16 {
     if Mounting::of(joint).reversed { load.saturating_neg() } else { load }
@@ -156,7 +156,8 @@ pub const fn load_from_servo(joint: Joint, load: i16) -> i16 {
 #[must_use]
 pub fn push_from_servo(joint: Joint, load: i16, speed: i16) -> i16 {
     let mounting = Mounting::of(joint);
-    // Thousandths of the load per count per second, times 1024: 372 degrees/s are 1757 or 1292 counts per second.
+    // The load that the speed needs, in 0.1 % per count per second, times 1024: 1000 / 1757 or 1000 / 1292, the counts
+    // per second of 372 degrees/s.
     let share = match mounting.scale {
         Scale::Counts850 => 583,
         Scale::Counts625 => 793,
@@ -190,7 +191,7 @@ mod tests {
         assert_eq!([counts(3, 0, 0), counts(3, 65, 0), counts(3, 180, 0)], [991, 684, 141]);
         assert_eq!([counts(4, 0, 0), counts(4, 90, 0), counts(4, 180, 0)], [936, 511, 86]);
         for wrist in [5, 6] {
-            // Half a count at 90 degrees (511.5) goes up.
+            // The 511.5 counts of 90 degrees round up.
             assert_eq!([counts(wrist, 0, 0), counts(wrist, 90, 0), counts(wrist, 180, 0)], [824, 512, 199]);
         }
         assert_eq!([counts(7, 0, 0), counts(7, 80, 0), counts(7, 180, 0)], [730, 1008, 1023]);
@@ -198,7 +199,7 @@ mod tests {
 
     #[test]
     fn golden_counts_with_offsets() {
-        // Ten degrees of offset are 47.2 or 34.7 counts less, on either side of a reversal (D9).
+        // Ten degrees of offset are 47.2 or 34.7 counts less, whether or not the servo is reversed (D9).
         assert_eq!([counts(1, 90, 10), counts(1, 90, -10)], [464, 558]);
         assert_eq!([counts(2, 90, 10), counts(2, 90, -10)], [398, 492]);
         assert_eq!([counts(7, 40, 10), counts(7, 40, -10)], [834, 904]);

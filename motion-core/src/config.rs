@@ -1,4 +1,4 @@
-//! The configuration of a controller: the board, the arm, and the state of the settings storage.
+//! The configuration of a controller: the properties of the board and of the arm.
 
 use protocol_core::time::Duration;
 

@@ -61,8 +61,8 @@ impl Controller {
         self.host.bytes(now, bytes)
     }
 
-    /// How many bytes from the host are needed for a new event. With fewer and no deadline, a shell may keep sleeping.
-    /// Silence on the line counts from the call that takes the bytes.
+    /// How many more bytes from the host are needed for a new event. A shell may keep sleeping until it has them or a
+    /// deadline comes. Silence on the line counts from the call that takes the bytes.
     #[must_use]
     pub fn host_bytes_wanted(&self) -> usize {
         self.host.bytes_wanted()
@@ -90,10 +90,10 @@ impl Controller {
     /// ([D5](protocol_core::decisions#d5)). An idle link must take the longest frame, 262 bytes.
     pub fn poll(&mut self, now: Instant, host_room: usize) -> Output<'_> {
         self.arm.take_answers(now);
-        // Before the control cycle, so that targets go out with its goals if no read waits before them.
+        // Before the control cycle, so that its goals include new targets. Only a read that waits for room delays them.
         self.execute_requests(now, host_room);
         self.arm.advance(now);
-        // What the watchdog does to the servos is sent at once.
+        // The frame that results from an action of the watchdog is sent at once.
         if self.arm.prepare_servo_frame(now)
             || (self.arm.watchdog_is_due && self.arm.poll_watchdog(now) && self.arm.prepare_servo_frame(now))
         {
@@ -149,8 +149,8 @@ impl Controller {
         }
     }
 
-    /// The latest time at which a delayed poll is unobservable to the host, unless bytes come before: the next report, or
-    /// silence that has an effect. Each deadline until then still needs its own call.
+    /// Unless bytes come, the host cannot observe that `poll` is late before this time: when the next report is due, or
+    /// silence on the line has an effect. Each deadline before it still needs its own call.
     #[must_use]
     pub fn host_deadline(&self) -> Instant {
         self.host.deadline()
@@ -192,7 +192,8 @@ impl Controller {
         self.host.baud()
     }
 
-    /// The registers.
+    /// The registers. The measurements in the extended block and the protection block are updated only when they are
+    /// sent to the host.
     #[must_use]
     pub const fn registers(&self) -> &RegisterFile {
         &self.arm.registers

@@ -30,8 +30,8 @@ enum Engagement {
     Released,
     /// The joint will engage at the next measurement. The trajectory keeps a target that the host writes meanwhile.
     Waiting { has_target: bool },
-    /// The joint has its measured position as its goal, or its set-point if it was silent. Its torque is not on yet, unless
-    /// its servo was silent only.
+    /// The goal of the joint is its measured position, or its set-point if it was silent. It has no torque yet, unless
+    /// its servo kept it during the silence.
     TorquePending { was_silent: bool, has_new_target: bool },
     /// The joint has torque and follows its set-point.
     Engaged,
@@ -72,7 +72,7 @@ impl Drive {
     }
 
     /// Marks the servo as silent. An engaged joint keeps its set-point until the servo answers again. A joint whose
-    /// torque is pending waits again, or is silent again.
+    /// torque is pending is silent again if it was silent before; otherwise it waits again.
     pub fn mark_silent(&mut self) {
         self.engagement = match self.engagement {
             Engagement::Engaged => Engagement::Silent { has_new_target: false },
@@ -143,8 +143,8 @@ impl Drive {
         Some(target)
     }
 
-    /// The servo has no torque any more: the joint engages anew where it is measured. Unless `keeps_target`, a target of the
-    /// host that came before is forgotten.
+    /// The servo has no torque any more: the joint engages anew where it is measured. Unless `keeps_target`, an earlier
+    /// target of the host is forgotten; a target that came during a silence is always kept.
     pub fn lose_torque(&mut self, keeps_target: bool) {
         self.engagement = match self.engagement {
             Engagement::Engaged => {

@@ -17,7 +17,7 @@ const HIDDEN_AFTER: u8 = 3;
 /// How often a goal is sent before torque to a servo that does not show it.
 const REPEATS: u8 = 3;
 
-/// What is known of the goal at one servo.
+/// Whether the servo of one joint has shown its goal.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct GoalCheck {
@@ -33,7 +33,7 @@ impl GoalCheck {
     /// No goal was sent.
     pub(crate) const NEW: Self = Self { misses: 0, is_done: false, had_torque: false };
 
-    /// A goal is to be sent, to a servo that is known to have torque or not.
+    /// Begins the check of a goal that will be sent. `had_torque` tells whether the servo is known to have torque.
     pub(crate) const fn begin(&mut self, had_torque: bool) {
         self.is_done = false;
         self.had_torque = had_torque;
@@ -50,8 +50,8 @@ impl GoalCheck {
         self.is_done = true;
     }
 
-    /// The servo shows another goal. Returns how often the goal has to be sent directly before torque; `None` if it has to
-    /// be asked for again.
+    /// The servo shows another goal. Returns how often the goal has to be sent directly before torque; `None` if the
+    /// servo has to be asked again.
     pub(crate) fn hidden(&mut self) -> Option<u8> {
         self.misses = self.misses.saturating_add(1).min(HIDDEN_AFTER);
         (self.misses == HIDDEN_AFTER).then_some(REPEATS)

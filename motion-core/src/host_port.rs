@@ -123,7 +123,7 @@ impl HostPort {
         self.waiting_read.take_if(|read| read.fits(room))
     }
 
-    /// Sets the report frequencies that the registers hold from `now` on.
+    /// Takes the report frequencies from the registers. They apply from `now` on.
     pub(crate) fn set_report_frequencies(&mut self, now: Instant, registers: &RegisterFile) {
         self.reports.set(now, registers, self.baud);
     }

@@ -34,7 +34,7 @@ use crate::servo_bus::{Answer, Reading, Torque};
 use crate::torque_check::{TorqueCheck, TorqueFound};
 pub(crate) use measured::Measured;
 
-/// What became of a joint that has a set-point.
+/// The result of the checks of a joint that has a set-point.
 enum Protected {
     Holds,
     Freed,
@@ -61,7 +61,7 @@ pub(crate) struct JointState {
     let_go: LetGo,
     torque: TorqueCheck,
     goal: GoalCheck,
-    /// The joint has not engaged since power-up, so its servo may hold it.
+    /// The joint has not engaged since the controller started. Its servo may still hold a goal from before.
     is_first_engagement: bool,
     /// The last question to the servo was not answered.
     pub(crate) is_unanswered: bool,
@@ -234,7 +234,7 @@ impl JointState {
         fell_silent
     }
 
-    /// Its servo may have restarted unnoticed.
+    /// The servo may have restarted unnoticed: its torque is read before it is sent the next goal.
     pub(crate) const fn doubt_torque(&mut self) {
         self.torque.doubt();
     }
@@ -250,15 +250,15 @@ impl JointState {
         self.drive.is_driven() && self.torque.is_trusted()
     }
 
-    /// Is the joint sent a goal at `now`? One without torque only while it is known where it is: some servos take a goal as an
-    /// order to switch torque on.
+    /// Is the joint sent a goal at `now`? A joint without torque gets one only while its measured position is fresh:
+    /// some servos take a goal as an order to switch torque on.
     #[inline]
     pub(crate) fn takes_goal_at(&self, now: Instant) -> bool {
         self.takes_goals() && (self.drive.is_engaged() || self.position.is_fresh(now))
     }
 
-    /// Has the next question to ask for the torque switch? `is_refresh_near` tells that torque is refreshed soon. A waiting
-    /// joint is always asked: it may have been silent, and its goal follows the answer at once
+    /// Does the next question have to ask for the torque switch? `is_refresh_near` tells that torque is refreshed soon.
+    /// A waiting joint is always asked: it may have been silent, and its goal follows the answer at once
     /// ([D29](protocol_core::decisions#d29)).
     pub(crate) fn wants_torque_read(&self, is_refresh_near: bool) -> bool {
         self.drive.is_waiting()
@@ -266,8 +266,8 @@ impl JointState {
                 && (self.torque.is_urgent() || (is_refresh_near && !self.torque.is_fresh())))
     }
 
-    /// The torque for the servo in the servo state; `None` leaves its switch unchanged. A servo is refreshed only if its
-    /// torque was read on since the last time, so that none is switched on that has let go.
+    /// The torque for the servo in the servo state; `None` leaves its switch unchanged. Torque is refreshed only if a
+    /// read has shown it on since the last refresh, so that a servo that let go is not switched on.
     pub(crate) fn take_torque(&mut self, is_protected: bool) -> Option<Torque> {
         let is_on = if self.drive.is_torque_pending() {
             self.goal.is_done()
@@ -294,7 +294,7 @@ impl JointState {
         self.alarms = 0;
     }
 
-    /// Enters or leaves the servo state: what held or freed the joint before is over.
+    /// Enters or leaves the servo state: forgets the obstacle, and that the joint was let go.
     pub(crate) fn set_driven(&mut self, is_driven: bool) {
         self.obstacle.forget();
         self.let_go = LetGo::NO;
@@ -312,13 +312,14 @@ impl JointState {
         self.obstacle.forget();
     }
 
-    /// The angles of the joint have changed without a move: its set-point is free ([D27](protocol_core::decisions#d27)).
+    /// The angles of the joint have changed without a move: its set-point is not held back any more
+    /// ([D27](protocol_core::decisions#d27)).
     pub(crate) fn release_set_point(&mut self) {
         self.obstacle.release();
     }
 
-    /// Does the set-point give way with the step that it made from `before`, towards the measured position
-    /// ([D27](protocol_core::decisions#d27))?
+    /// Does an obstacle hold back the set-point, and did the last step, from `before`, bring it nearer to the measured
+    /// position ([D27](protocol_core::decisions#d27))?
     pub(crate) fn gives_way_from(&self, before: MicroDegrees) -> bool {
         let distance = |angle: MicroDegrees| self.measured.map(|at| at.0.abs_diff(angle.0));
         self.obstacle.is_holding_back() && distance(self.drive.set_point()) < distance(before)

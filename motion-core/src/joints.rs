@@ -25,7 +25,8 @@ use crate::reach::Reached;
 use crate::servo_bus::{Answer, Question, Torque};
 use crate::supply_watch::SupplyWatch;
 
-/// A servo that restarts executes nothing for about 200 ms. Within less than this after an answer it is the same servo.
+/// A servo that restarts executes nothing for about 200 ms. So a servo that answered less than this ago has not
+/// restarted unnoticed.
 const RESTART_TIME: Duration = Duration::from_millis(180);
 
 /// The seven joints and their motor state.
@@ -35,7 +36,7 @@ pub(crate) struct Joints {
     joints: [JointState; JOINTS],
     state: MotorState,
     supply: SupplyWatch,
-    /// Until then every engaged joint was heard a moment ago.
+    /// Before this time, every engaged joint has answered within [`RESTART_TIME`] or is doubted already.
     doubt_at: Instant,
 }
 
@@ -184,7 +185,7 @@ impl Joints {
             self.supply.answered(now);
         }
         match outcome {
-            // An alarm from before an emergency stop may tell it before the torque switch does.
+            // After an emergency stop, an old alarm may reveal the lost supply before the torque switch does.
             Measured::Freed | Measured::TorqueLost if self.is_supply_lost(joint) => Measured::SupplyLost,
             Measured::TorqueLost => {
                 self.joint_mut(joint).into_iter().for_each(|state| state.lose_torque(now));
@@ -288,7 +289,7 @@ impl Joints {
         registers.set(SERVO_ALARMS.address, alarms);
     }
 
-    /// Is there a goal at `now`?
+    /// Is any joint sent a goal at `now`?
     pub(crate) fn any_goal(&self, now: Instant) -> bool {
         self.joints.iter().any(|state| state.takes_goal_at(now))
     }

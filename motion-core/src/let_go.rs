@@ -8,8 +8,8 @@
 //!      └── engaged anew: no alarm for 500 ms, at rest after an overload, cooler after heat ───┘
 //! ```
 //!
-//! A joint engages anew three times in a minute, and then only after an order of the host. This file does not know
-//! registers or the bus.
+//! A joint engages anew at most three times in a minute. After that it needs an order of the host. This file does not
+//! know registers or the bus.
 
 use protocol_core::time::{Duration, Instant};
 
@@ -17,16 +17,18 @@ use crate::calibration::MicroDegrees;
 use crate::servo_bus::Answer;
 use crate::servo_bus::frame::error::{OVERHEAT, OVERLOAD};
 
-/// A joint that an alarm freed is this far from its set-point at least.
+/// With an alarm and no load, a joint counts as freed if it is farther than this from its set-point, in millionths of a
+/// degree, for [`FAR_FOR`].
 const FAR: u32 = 3_000_000;
-/// For this long.
+/// See [`FAR`].
 const FAR_FOR: Duration = Duration::from_millis(200);
-/// Or it has turned away from its set-point by this much since the alarm came without load.
+/// It also counts as freed if it has turned away from its set-point by this much since then, in millionths of a degree.
 const TURNED_AWAY: i32 = 1_000_000;
-/// How long an alarm has to be gone, and a joint to be at rest after an overload.
+/// A joint engages anew when its alarm has been gone for this long or, after an overload, when it has been at rest for
+/// this long.
 const CALM_FOR: Duration = Duration::from_millis(500);
-/// A joint that turns slower is at rest, in counts per second: 12.7 degrees/s of joints 1 to 4, 17 of the others. A damped arm with
-/// 300 g sinks at 7 degrees/s, and is caught.
+/// A joint that turns no faster is at rest, in counts per second: 12.7 degrees/s for joints 1 to 4, 17 for the others.
+/// A damped arm with 300 g sinks at 7 degrees/s, so it can engage while it sinks.
 const REST_SPEED: u16 = 60;
 /// How much cooler a servo has to be than when it became too hot, in degrees Celsius.
 const COOLER_BY: u8 = 5;
@@ -35,14 +37,14 @@ const WINDOW: Duration = Duration::from_millis(60_000);
 /// See [`WINDOW`].
 const ATTEMPTS: usize = 3;
 
-/// Does the servo of one joint hold it?
+/// Whether the servo of one joint holds it, and how often the joint engaged anew.
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct LetGo {
     state: State,
     /// When the joint engaged anew, the latest first.
     attempts: [Option<Instant>; ATTEMPTS],
-    /// It engaged too often. Only the host can make it engage again.
+    /// The joint engaged too often. Only the host can make it engage again.
     is_exhausted: bool,
     /// The host has ordered it to engage.
     is_ordered: bool,
@@ -52,7 +54,8 @@ pub(crate) struct LetGo {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 enum State {
     Holding,
-    /// There is an alarm and no load. Since then the joint was no nearer to its set-point than `nearest`, and it is far from it since.
+    /// There is an alarm and no load. `nearest` is the angle nearest to the set-point since then. `far_since` is when
+    /// the joint came farther than [`FAR`] from it; `None` while it is nearer.
     Suspected {
         nearest: MicroDegrees,
         far_since: Option<Instant>,
@@ -66,7 +69,8 @@ enum State {
         alarm_at: Instant,
         /// The last answer at which the joint was not at rest.
         moved_at: Instant,
-        /// According to its last answer, an alarm keeps the servo from holding. When heat ends, a servo holds by itself.
+        /// According to its last answer, an alarm keeps the servo from holding. A servo that was too hot holds again by
+        /// itself when the alarm ends.
         is_freed: bool,
         /// Torque-off was sent: without it a latched overload would not end.
         has_torque_off: bool,
@@ -117,7 +121,8 @@ impl LetGo {
                 false
             }
             State::Suspected { nearest, far_since } => {
-                // Not by how far the set-point moved: the servo of a joint that stands may have no load yet.
+                // Only a turn of the joint counts, not a step of the set-point: the servo of a joint at rest may have
+                // no load yet.
                 let turned = angle.0 - nearest.0;
                 let turned_away = if angle.0 < set_point.0 { -turned } else { turned };
                 if turned_away < 0 {
@@ -164,7 +169,8 @@ impl LetGo {
         }
     }
 
-    /// May the joint engage now, at this temperature of its servo in degrees Celsius? By itself only if `is_protected`.
+    /// May the joint engage now, at this temperature of its servo in degrees Celsius? Without `is_protected` it needs
+    /// an order of the host.
     pub(crate) fn may_engage(&mut self, now: Instant, temperature: u8, is_protected: bool) -> bool {
         let State::LetGo { alarms, hot_at, alarm_at, moved_at, is_freed, has_torque_off } = self.state else {
             return true;
@@ -216,7 +222,8 @@ mod tests {
         Answer { reading, alarms: VOLTAGE, torque: None, answer_micros: 0 }
     }
 
-    /// Is the joint freed at the last of these times in milliseconds, angles and set-points in millionths of a degree?
+    /// Is the joint freed at the last of these answers: time in milliseconds, angle and set-point in millionths of a
+    /// degree?
     fn is_freed(answers: &[(u64, i32, i32)]) -> bool {
         let mut let_go = LetGo::NO;
         answers.iter().fold(false, |_, &(millis, angle, set_point)| {

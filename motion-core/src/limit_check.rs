@@ -11,7 +11,7 @@ use crate::calibration::MicroDegrees;
 use crate::limits::{claw_allows, linkage_allows};
 use crate::reach::Reached;
 
-/// What the limits concern: an angle of each joint.
+/// The angle of each joint that the limits are checked with; `None` for a joint that has none.
 pub(crate) type Angles = [Option<MicroDegrees>; JOINTS];
 
 /// A write that is to be checked.
@@ -44,8 +44,8 @@ impl LimitCheck<'_> {
         linkage.into_iter().chain(claw).min()
     }
 
-    /// The register because of which a limit refuses the write. `kept` tells whether the targets after the write and the
-    /// set-points keep the limit.
+    /// The register that is reported if `limit` refuses the write; `None` if it does not. `kept` tells whether the
+    /// targets after the write and the set-points keep the limit.
     fn refused_by(&self, limit: u8, joints: &[Joint], kept: (bool, bool)) -> Option<u8> {
         let (targets_keep, set_points_keep) = kept;
         if self.limits_after() & limit == 0 {
@@ -74,7 +74,7 @@ impl LimitCheck<'_> {
     }
 }
 
-/// Only angles that are there can break a limit.
+/// A limit is kept where an angle is missing.
 fn linkage_is_kept(angles: &Angles) -> bool {
     let [_, two, three, ..] = *angles;
     two.zip(three).is_none_or(|(two, three)| linkage_allows(two, three))

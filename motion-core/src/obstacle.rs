@@ -12,14 +12,15 @@ use crate::push_limiter::{PushLimit, PushLimiter, PushSample};
 const BLOCKED_AFTER: Duration = Duration::from_millis(1_000);
 /// [`BLOCKED_AFTER`] in control cycles of 10 ms.
 const BLOCKED_AFTER_CYCLES: u8 = 100;
-/// A joint that came nearer by more than a count has moved: 0.29 degrees of joints 5 to 7.
+/// A joint has moved if it came nearer to its target by more than this, in millionths of a degree. One count is 0.29
+/// degrees for joints 5 to 7.
 const NEARER_BY: u32 = 300_000;
 
 /// A set-point that an obstacle holds back.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct HeldBack {
     pub(crate) set_point: MicroDegrees,
-    /// The joint is blocked and tries nothing, so its target is the set-point.
+    /// The joint is blocked and does not retry, so its set-point becomes its target.
     pub(crate) ends_move: bool,
 }
 
@@ -28,8 +29,9 @@ pub(crate) struct HeldBack {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Obstacle {
     limiter: PushLimiter,
-    /// For how many control cycles the joint is held back and came no nearer than this distance to its target. The time of a
-    /// late call does not count: the joint was neither measured nor driven meanwhile.
+    /// For how many control cycles the joint has been held back without coming nearer to its target, and its distance
+    /// from the target when they began, in millionths of a degree. The time of a late call does not count: the joint
+    /// was neither measured nor driven meanwhile.
     held: Option<(u8, u32)>,
     is_blocked: bool,
     /// When the last point of a stream came, if the joint is blocked and tries to reach it.
@@ -41,13 +43,13 @@ impl Obstacle {
     pub(crate) const NONE: Self =
         Self { limiter: PushLimiter::FREE, held: None, is_blocked: false, retrying_since: None };
 
-    /// The set-point is free. A blocked joint stays blocked until the next target for it.
+    /// Stops holding back the set-point. A blocked joint stays blocked until the next target for it.
     #[inline(never)]
     pub(crate) fn release(&mut self) {
         *self = Self { is_blocked: self.is_blocked, ..Self::NONE };
     }
 
-    /// Nothing is in the way any more.
+    /// Forgets the obstacle, and that the joint is blocked.
     pub(crate) fn forget(&mut self) {
         self.is_blocked = false;
         self.release();

@@ -17,10 +17,10 @@ use crate::calibration::MicroDegrees;
 
 /// A stream needs three points; one more may be due within the present control cycle.
 const CAPACITY: usize = 4;
-/// The part of its error by which a frame shifts the grid: 1/16.
+/// A frame shifts the grid by 1/16 of the distance between the grid and the time that the frame asks for.
 const SHIFT_DIVISOR: u64 = 16;
 
-/// A frame that comes later than this part of a period after the joint passed the point before it follows a lost one: 1/8.
+/// If a frame comes later than 1/8 of a period after the previous point was due, a frame between them was lost.
 const LATE_DIVISOR: u64 = 8;
 
 /// A point of a stream.
@@ -80,7 +80,7 @@ impl PointStream {
             return wanted; // A new stream.
         }
         let slot = self.last_due + period;
-        // The joint has been waiting for longer than a late frame takes: the frame before this one is lost.
+        // The joint has waited longer than it would for a late frame: the frame before this one was lost.
         let slot = if now > self.last_due + part(period, LATE_DIVISOR) { slot + period } else { slot };
         let late = part(wanted - slot, SHIFT_DIVISOR);
         let early = part(slot - wanted, SHIFT_DIVISOR);

@@ -26,10 +26,10 @@ const COUNTS_PER_SECOND: u32 = 2_000;
 const SINKING_COUNTS_PER_SECOND: u32 = 60;
 /// The allowance for sinking grows up to this age of a reading, to 15 counts.
 const SINKS_FOR_MILLIS: u32 = 250;
-/// After a longer pause a false position is within reach of the previous answer, and so far away that a joint whose set-point
-/// follows it would jump.
+/// After a longer pause, a false position may be within reach of the previous answer and yet so far away that a joint
+/// whose set-point follows it would jump.
 const LONG_PAUSE_MILLIS: u32 = 30;
-/// The speeds of a joint that may have come far in a pause, in counts per second.
+/// The measured speeds that explain a large change of position in a pause, in counts per second.
 const TURNING: RangeInclusive<u16> = 60..=2_000;
 /// The largest difference between two readings of a joint at rest.
 const JITTER_COUNTS: u32 = 8;
@@ -41,7 +41,8 @@ pub enum FilterOutcome {
     Accepted(u16),
     /// The position is out of reach of the previous answer.
     Rejected,
-    /// The position is rejected for the third time in a row: the servo counts as silent from now on.
+    /// The position is rejected, and the two reads before brought no accepted answer either: the servo counts as silent
+    /// from now on.
     FellSilent,
 }
 
@@ -57,7 +58,7 @@ pub struct PositionFilter {
     position: Option<u16>,
     /// Were the last two answers nearly equal?
     is_steady: bool,
-    /// Were they not, and a long pause was between them?
+    /// Were the last two answers not nearly equal, with a long pause between them?
     is_jump: bool,
     /// Consecutive reads without an accepted answer.
     failures: u8,
@@ -129,8 +130,9 @@ impl PositionFilter {
         self.is_steady
     }
 
-    /// Has the joint jumped in a long pause, although its servo measured with the last answer that it hardly turns, or that it
-    /// turns faster than it can, in counts per second? Then the answer may be damaged.
+    /// Did the position jump across a long pause, although `speed` does not explain it? `speed` is from the last
+    /// answer, in counts per second; it may be too low, or higher than a joint can turn. Then the answer may be
+    /// damaged.
     #[must_use]
     pub fn is_doubtful(&self, speed: i16) -> bool {
         self.is_jump && !TURNING.contains(&speed.unsigned_abs())

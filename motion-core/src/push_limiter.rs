@@ -22,7 +22,7 @@ use crate::calibration::MicroDegrees;
 pub enum PushLimit {
     /// Of a joint that carries the arm, in 0.1 % of the stall torque.
     Arm(i16),
-    /// Of the claw, which carries nothing: what it holds may break.
+    /// Of the claw, in 0.1 % of the stall torque. It carries no load, but may break what it holds.
     Grip(i16),
 }
 
@@ -32,9 +32,10 @@ impl PushLimit {
         permille
     }
 
-    /// How long a turning joint may exceed it, and one at a standstill. [D27](protocol_core::decisions#d27) allows 300 ms. A
-    /// joint of the arm stays over it for up to 270 ms when it turns back at full speed with 300 g: it brakes and accelerates
-    /// with the same push. It turns after a push of 80 ms.
+    /// How long a turning joint, and a joint at a standstill, may exceed the limit. [D27](protocol_core::decisions#d27)
+    /// allows 300 ms. A joint of the arm that reverses at full speed with 300 g exceeds it for up to 270 ms, because it
+    /// brakes and accelerates with the same push. A joint at a standstill begins to turn within 80 ms unless it is
+    /// blocked.
     const fn grace(self) -> [Duration; 2] {
         match self {
             Self::Arm(_) => [Duration::from_millis(280), Duration::from_millis(80)],
@@ -48,7 +49,7 @@ const STANDSTILL: u32 = 300_000;
 /// The assumed distance of the goal at which a servo just gives its full load. It bounds the distance as long as the servo is
 /// at full load: 4.3 degrees, as arm-sim assumes.
 const FULL_LOAD_DISTANCE: i32 = 4_300_000;
-/// From this load on a servo may give all it has, in 0.1 %.
+/// A servo with this load or more, in 0.1 %, may be at full load.
 pub(crate) const FULL_LOAD: i16 = 950;
 /// How far the push may exceed the limit while a joint sinks slowly ([D27](protocol_core::decisions#d27)).
 const TOLERANCE: i16 = 50;
@@ -56,7 +57,8 @@ const TOLERANCE: i16 = 50;
 /// ([D27](protocol_core::decisions#d27)), in micro-degrees per millisecond. Goals are whole counts, so the bound itself
 /// moves at 8 degrees/s.
 const SINK_PER_MILLISECOND: i32 = 8_000;
-/// This far under the limit, the distance may grow again; half the limit if that is less.
+/// The distance may grow again when the push is this far under the limit; with a limit under twice this, when the push
+/// is under half the limit.
 const SLACK: i16 = 100;
 /// The growth of the distance after each average.
 const GROWTH: i32 = 100_000;
@@ -70,7 +72,7 @@ pub struct PushSample {
     pub angle: MicroDegrees,
     /// The load less what the speed needs, in 0.1 % of the stall torque.
     pub push: i16,
-    /// The servo may give all it has, so its load does not tell how far away its goal is.
+    /// The servo may be at full load, so its load does not tell how far away its goal is.
     pub is_saturated: bool,
 }
 
@@ -119,8 +121,8 @@ impl PushLimiter {
     /// A joint that nothing holds back.
     pub const FREE: Self = Self { phase: Phase::Free };
 
-    /// Takes a measurement of a driven joint. Returns whether the joint is limited, and has turned past `set_point` in the
-    /// direction of its push. Nothing stops it, and this set-point would turn it back.
+    /// Takes a measurement of a driven joint. Returns whether the joint is limited, and has turned past `set_point` in
+    /// the direction of its push. Then nothing stops the joint, and this set-point would turn it back.
     #[inline]
     pub fn measured(
         &mut self,
@@ -142,7 +144,7 @@ impl PushLimiter {
         if bound.is_positive { angle > set_point } else { angle < set_point }
     }
 
-    // Not inlined: hardly any measurement calls it, and all would save its registers.
+    // Not inlined: few measurements call it, but with it inlined all would save its CPU registers.
     #[inline(never)]
     fn follow(&mut self, now: Instant, sample: PushSample, set_point: MicroDegrees, limit: PushLimit) {
         let [grace, grace_at_standstill] = limit.grace();
@@ -238,7 +240,8 @@ impl Bound {
         true
     }
 
-    /// Moves the bound with the measured position. It comes back slowly as long as the push is within the tolerance.
+    /// Moves the bound with the measured position. While the push is within the tolerance, the bound retreats at most
+    /// at the sink speed.
     fn follow(&mut self, now: Instant, angle: MicroDegrees) {
         let reach = directed_angle(self.distance, self.is_positive);
         let ahead = directed_angle(angle.0.saturating_add(reach) - self.set_point.0, self.is_positive);

@@ -6,7 +6,7 @@
 //!   54..65  tip, tool, disc direction    IK7: joints 1 to 6
 //! ```
 //!
-//! A block counts only if the frame covers the whole of it. This file does not know joints or what they do.
+//! A block counts only if the frame covers the whole of it. This file does not know how joints move.
 
 use kinematics::{NoSolution, Vector, ik5, ik6, ik7};
 use protocol_core::registers::map21::{
@@ -22,7 +22,7 @@ use crate::calibration::MicroDegrees;
 pub(crate) struct Reached {
     /// `None` for a joint that keeps its target.
     pub(crate) targets: [Option<MicroDegrees>; JOINTS],
-    /// The first register of a block that sets targets.
+    /// The lowest register of the blocks that set targets.
     pub(crate) address: u8,
 }
 
@@ -65,7 +65,7 @@ pub fn is_within(accepted: &Accepted<'_>) -> bool {
     targets(accepted).is_ok()
 }
 
-/// Solves the blocks of a write: IK5 first, then IK6 or IK7, which replaces its angles.
+/// Solves the blocks of a write: IK5 first, then IK6 or IK7, whose angles replace the angles of IK5.
 pub(crate) fn targets(accepted: &Accepted<'_>) -> Result<Reached, OutOfReach> {
     let mut reached = Reached::NONE;
     if let Some(wrist) = accepted.values_at(WRIST_POSITION.address) {

@@ -28,8 +28,8 @@ impl ReportTimer {
     /// The timer without reports.
     pub const OFF: Self = Self { frequency: 0, due: Instant::FAR_FUTURE, remainder: 0 };
 
-    /// Sets the frequency in Hz (register 53, 0 to 50), limited to `highest`. The first report is due one period after
-    /// `now`. Setting the same frequency again has no effect.
+    /// Sets the frequency in Hz, as a frequency register holds it, limited to `highest`. The first report is due one
+    /// period after `now`. Setting the same frequency again has no effect.
     pub fn set(&mut self, now: Instant, frequency: u8, highest: u32) {
         let frequency = u32::from(frequency).min(highest);
         if frequency != self.frequency {

@@ -1,8 +1,8 @@
 //! The streams of reports: register 53 of map 2.2, or registers 82 and 90 of map 2.1 ([D14](protocol_core::decisions#d14),
 //! [M4](protocol_core::decisions#m4)).
 //!
-//! The streams of both maps never run at the same time. The streams of map 2.1 share the half of the line that D14 allows.
-//! This file does not know the values in a report.
+//! Streams of the two maps never run at the same time. The streams of map 2.1 share the half of the line that D14
+//! allows. This file does not know the values in a report.
 
 use protocol_core::registers::RegisterFile;
 use protocol_core::registers::map::{FEEDBACK_FREQUENCY, REPORT_CONTENT};
@@ -36,7 +36,7 @@ impl Reports {
         due: Instant::FAR_FUTURE,
     };
 
-    /// Sets the frequencies that the registers hold from `now` on. `baud` is in bits per second.
+    /// Takes the frequencies from the registers. They apply from `now` on. `baud` is in bits per second.
     pub(crate) fn set(&mut self, now: Instant, registers: &RegisterFile, baud: u32) {
         let frequencies =
             [ANGLE_FEEDBACK_FREQUENCY, LOAD_FEEDBACK_FREQUENCY].map(|row| registers.get(row.address));
@@ -77,8 +77,8 @@ impl Reports {
     }
 }
 
-/// Two frequencies in Hz that are together at most `most`, in the ratio of the wanted ones. A wanted one keeps at least
-/// 1 Hz.
+/// Two frequencies in Hz that are together at most `most`, in the ratio of the wanted ones. A stream that is wanted
+/// keeps at least 1 Hz.
 fn shares(wanted: [u8; 2], most: u32) -> [u8; 2] {
     let sum: u32 = wanted.iter().map(|&frequency| u32::from(frequency)).sum();
     if sum <= most {

@@ -17,7 +17,7 @@ const ALL_JOINTS: u8 = 0x7F;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Status {
     storage: Storage,
-    /// Fault bits that stay until the next restart.
+    /// Fault bits that stay until the next restart, or until [`Status::clear_faults`].
     lasting_faults: u8,
 }
 
@@ -37,7 +37,7 @@ impl Status {
         self.storage = storage;
     }
 
-    /// Raises fault bits until the next restart.
+    /// Raises fault bits. They stay until the next restart, or until [`Status::clear_faults`].
     pub(crate) const fn raise_faults(&mut self, bits: u8) {
         self.lasting_faults |= bits;
     }

@@ -27,14 +27,14 @@ impl SupplyWatch {
     /// No servo is silent.
     pub(crate) const NEW: Self = Self { all_silent_since: None, was_outage: false };
 
-    /// A question was not answered at `now`. `are_all_silent` tells about the driven servos.
+    /// A question was not answered at `now`. `are_all_silent` tells whether all driven servos are silent.
     pub(crate) fn unanswered(&mut self, now: Instant, are_all_silent: bool) {
         if are_all_silent && !self.was_outage {
             self.all_silent_since.get_or_insert(now);
         }
     }
 
-    /// No joint is driven any more: a silence of servos without torque tells nothing of the supply.
+    /// No joint is driven any more: the silence of servos without torque tells nothing about the supply.
     pub(crate) const fn none_driven(&mut self) {
         self.all_silent_since = None;
     }
@@ -50,8 +50,8 @@ impl SupplyWatch {
         *self = Self::NEW;
     }
 
-    /// The host wrote the motor state. Servos that answer have supply, so the order counts for them: their joints may engage,
-    /// although no driven servo has answered yet. An outage of all servos goes on.
+    /// The host wrote the motor state. Servos that answer have supply, so the order counts for them: their joints may
+    /// engage, although no driven servo has answered yet. While no servo answers, the outage continues.
     pub(crate) const fn ordered(&mut self, any_answers: bool) {
         self.was_outage = false;
         if any_answers {
@@ -64,8 +64,8 @@ impl SupplyWatch {
         self.was_outage || self.all_silent_since.is_some_and(|since| now - since >= LOST_AFTER)
     }
 
-    /// The servo of a driven joint was found without torque. Returns whether the supply was lost. `are_others_driven` tells
-    /// whether other driven joints were not found without torque yet.
+    /// The servo of a driven joint was found without torque. Returns whether the supply was lost. `are_others_driven`
+    /// tells whether other joints still count as driven. The supply is lost only when none is left.
     pub(crate) const fn is_lost(&mut self, are_others_driven: bool) -> bool {
         let is_lost = self.was_outage && !are_others_driven;
         if is_lost {

@@ -1,5 +1,5 @@
-//! What is known of the torque switch of one servo that should be on ([D28](protocol_core::decisions#d28),
-//! [D29](protocol_core::decisions#d29)).
+//! Whether the torque switch of a servo that should hold torque is on, as far as it is known
+//! ([D28](protocol_core::decisions#d28), [D29](protocol_core::decisions#d29)).
 //!
 //! ```text
 //!                 read: on                 a question was not answered
@@ -19,7 +19,7 @@ const CONFIRMED_BY: u8 = 2;
 enum Known {
     /// It was ordered on, and not read since.
     Ordered,
-    /// It was read on.
+    /// The last read showed it on.
     On,
     /// A question was not answered since it was read, or the servo was not heard for long.
     Doubtful,
@@ -43,7 +43,7 @@ pub(crate) struct TorqueCheck {
     known: Known,
     /// Successive answers that say off.
     offs: u8,
-    /// It was read on since torque was last refreshed.
+    /// A read has shown it on since torque was last refreshed.
     is_fresh: bool,
 }
 
@@ -51,12 +51,13 @@ impl TorqueCheck {
     /// Torque is to be switched on.
     pub(crate) const ORDERED: Self = Self { known: Known::Ordered, offs: 0, is_fresh: false };
 
-    /// A question was not answered. Answers before and after it count together: some servos answer every second time.
+    /// A question was not answered. The count of answers that say off goes on, because some servos answer only every
+    /// second question.
     pub(crate) const fn unanswered(&mut self) {
         self.doubt();
     }
 
-    /// It is not known any more whether the switch is on, although no question was lost.
+    /// The switch may have gone off unnoticed, although no question was lost.
     pub(crate) const fn doubt(&mut self) {
         self.known = Known::Doubtful;
         self.is_fresh = false;
@@ -87,12 +88,12 @@ impl TorqueCheck {
         self.known != Known::Doubtful && self.offs == 0
     }
 
-    /// Has the switch to be read with the next question, whenever torque is refreshed next?
+    /// Does the next question have to read the switch, even if no refresh of torque is near?
     pub(crate) fn is_urgent(self) -> bool {
         self.known != Known::On || self.offs > 0
     }
 
-    /// Was the switch read on since torque was last refreshed?
+    /// Has a read shown the switch on since torque was last refreshed?
     pub(crate) const fn is_fresh(self) -> bool {
         self.is_fresh
     }

@@ -61,7 +61,7 @@ impl Duration {
     }
 }
 
-/// A fraction of a microsecond counts as a whole one, so that a wait for what is left of a time always ends.
+/// Rounds up to whole microseconds, so that a wait for the remaining time always ends.
 impl From<core::time::Duration> for Duration {
     fn from(time: core::time::Duration) -> Self {
         Self(time.as_nanos().div_ceil(1_000).try_into().unwrap_or(u64::MAX))
@@ -76,7 +76,7 @@ impl Add<Duration> for Instant {
     }
 }
 
-/// The time from `earlier` to `self`; zero if it is the other way round.
+/// The time from `earlier` to `self`; zero if `earlier` is later than `self`.
 impl Sub for Instant {
     type Output = Duration;
 

@@ -1,4 +1,4 @@
-//! The reference board: pins, clocks, priorities and times. Other wiring is an edit of this file only.
+//! The reference board: pins, clocks, priorities and times. For other wiring, edit only this file.
 //!
 //! ```text
 //!   PA9   USART1 TX ──▶ host          PC6   pump, high = on
@@ -17,8 +17,8 @@ use super::gpio::{Active, GpioPort, Pin};
 use crate::clock_rates::ClockSource;
 use crate::crystal;
 
-/// The crystals that may be fitted, in MHz, in rising order. The firmware measures which one it is. The measurement is exact to
-/// some 4 %, so it cannot tell 24 or 26 MHz from 25: a board with one of these names only that one.
+/// The crystals that may be fitted, in MHz, in rising order. The firmware measures which one it is. The measurement is
+/// exact to some 4 %, so it cannot tell 24 or 26 MHz from 25: a board with one of these two lists only that one.
 pub const CRYSTALS_MHZ: &[u8] = &[8, 12, 16, 25];
 
 const _: () = assert!(crystal::are_distinct(CRYSTALS_MHZ));
@@ -29,8 +29,8 @@ pub const HOST_TRANSMIT: Pin = Pin::new(GpioPort::A, 9);
 pub const HOST_RECEIVE: Pin = Pin::new(GpioPort::A, 10);
 /// Servo bus, USART2: one wire, open drain. The bus needs an external pull-up to 3.3 V.
 pub const SERVO_BUS: Pin = Pin::new(GpioPort::A, 2);
-/// Direction of the buffer of the servo bus, and the level at which the board drives the bus; `None` for a bus without a
-/// buffer whose pin is used otherwise. Without a buffer the pin stays unconnected.
+/// Direction of the buffer of the servo bus, and the level at which the board drives the bus; `None` if the bus has no
+/// buffer and the pin has another use. If the pin is unconnected, a bus without a buffer needs no change here.
 pub const SERVO_DIRECTION: Option<(Pin, Active)> = Some((Pin::new(GpioPort::A, 1), Active::High));
 /// Alternate function of the pins above: USART1 and USART2 (DS8626, table 9).
 pub const USART_FUNCTION: u8 = 7;
@@ -48,7 +48,7 @@ pub const LED: Pin = Pin::new(GpioPort::C, 12);
 /// Level that switches the LED on.
 pub const LED_ACTIVE: Active = Active::Low;
 
-/// The time of so many bytes on the servo bus, in microseconds.
+/// The time that this many bytes take on the servo bus, in microseconds.
 pub const fn servo_micros(bytes: u32) -> u32 {
     10_000_000 / SERVO_BAUD * bytes
 }

@@ -39,7 +39,7 @@ const _: () = assert!(clock_rates::INTERNAL_HZ == INTERNAL_MHZ as u32 * 1_000_00
 pub struct StartedClock {
     /// The source of the core clock.
     pub source: ClockSource,
-    /// The crystal as measured against the internal oscillator; `None` if it did not start.
+    /// The crystal as measured against the internal oscillator; `None` if it did not start or could not be measured.
     pub crystal_khz: Option<u32>,
 }
 
@@ -58,7 +58,8 @@ pub fn start(rcc: &pac::RCC, flash: &pac::FLASH, dbgmcu: &pac::DBGMCU, timer: &p
     StartedClock { source, crystal_khz }
 }
 
-/// Switches to the best clock that works. `crystal_mhz` is one of the board's crystals; `None` if there is none to be used.
+/// Switches to the best clock that works. `crystal_mhz` is one of the board's crystals; `None` if no crystal can be
+/// used.
 fn select(rcc: &pac::RCC, flash: &pac::FLASH, crystal_mhz: Option<u8>) -> ClockSource {
     if let Some(mhz) = crystal_mhz
         && lock_pll(rcc, mhz, true)
@@ -191,7 +192,7 @@ impl Clock {
         if let Some(cycles) = tick::cycles(wait, self.cycles_per_micro)
             && cycles < SYST::get_current()
         {
-            // A tick between these writes would restore the period before it is short, and it would stay short.
+            // A tick between these writes would restore the usual period too early, and the short period would stay.
             cortex_m::interrupt::free(|_| {
                 FULL_TICK.store(reload(self.cycles_per_micro), Ordering::Relaxed);
                 self.ticker.set_reload(cycles.max(1));

@@ -28,11 +28,12 @@ static ENTERED: AtomicBool = AtomicBool::new(false);
 #[unsafe(link_section = ".uninit.RESET_CAUSE")]
 static RESET_CAUSE: AtomicU32 = AtomicU32::new(0);
 
-/// How often the frame is sent. A servo that has the length of an interrupted frame of goals may wait for 53 more bytes. If
-/// no pause ends its wait, it takes two frames of 22 bytes and a part of the third for them. A servo that hears none of the
-/// four holds its goal.
+/// How often the frame is sent. A crash may interrupt a frame of goals: a servo that has received its length may wait
+/// for 53 more bytes. If no pause ends this wait, the servo takes two frames of 22 bytes and a part of the third as
+/// those bytes, and parses the fourth. A servo that receives none of the four holds its goal.
 const REPEATS: usize = 4;
-/// Pause before each frame, in microseconds: longer than the longest frame (57 bytes), or than a servo's wait and its answer.
+/// Pause before each frame, in microseconds: longer than the longest frame (57 bytes), and longer than a servo's wait
+/// and its answer.
 const PAUSE_MICROS: u32 = 1_000 + board::servo_micros(100);
 /// Polls until a byte is sent, which takes 1,680 cycles at 168 MHz.
 const SEND_POLLS: u32 = 20_000;

@@ -28,7 +28,7 @@ static LINE: SharedUart<USART2, ServoDirection, RECEIVE, TRANSMIT> = SharedUart:
 pub struct ServoDirection;
 
 impl ServoDirection {
-    /// Makes the pin an output that listens.
+    /// Makes the pin an output, at the level at which the board listens.
     fn open(mut self) {
         if let Some((pin, _)) = board::SERVO_DIRECTION {
             self.receive();

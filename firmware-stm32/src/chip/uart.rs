@@ -11,8 +11,8 @@
 //! QEMU 7.2 an empty transmitter does not raise it.
 //!
 //! If the receive queue is full, the byte stays in the USART and the interrupt stays masked until the loop reads the
-//! queue. In the emulator the sender then waits. On a wire the byte after the next one is an overrun. Overruns and all
-//! other receive errors are counted.
+//! queue. In the emulator the sender then waits. On a wire, an overrun occurs when the next byte is complete. Overruns
+//! and all other receive errors are counted.
 //!
 //! Both sides access the line in a critical section. The loop moves few bytes in each, so that even on the internal
 //! oscillator it takes less than the 10 microseconds within which a byte of the servo bus has to be read.
@@ -209,8 +209,8 @@ impl<U: Usart, D: BusDirection, const RECEIVE: usize, const TRANSMIT: usize>
     /// Takes the next chunk once the last one is consumed.
     fn refill(&mut self) -> Taken {
         let Self { line, chunk, len, taken } = self;
-        // Unmask even if the loop takes no byte. The masked interrupt also sends, and the controller may wait for room to
-        // send before it takes more bytes.
+        // Unmask even if the loop takes no byte. The same interrupt sends, and the controller may wait for room to send
+        // before it takes more bytes.
         line.unmask();
         if *taken >= *len {
             *taken = 0;

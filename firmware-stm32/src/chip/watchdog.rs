@@ -6,8 +6,8 @@ use super::{board, clock};
 use crate::wait::wait_within;
 use crate::watchdog_gate::WatchdogGate;
 
-/// The longest time until the registers have taken their values, in microseconds: five cycles of the slowest oscillator behind
-/// its divider of up to 256. ST's drivers wait as long.
+/// The longest wait until the registers have taken their values, in microseconds. ST's drivers wait as long: six cycles
+/// of 32 kHz behind a divider of 256. Behind the divider of 64 here, five cycles of the slowest oscillator take 19 ms.
 const UPDATE_MICROS: u32 = 48_000;
 
 /// The running watchdog.

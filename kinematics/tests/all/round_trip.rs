@@ -24,7 +24,7 @@ fn distances(was: &Frames<f64>, is: &Frames<f64>) -> [f64; 3] {
     [distance(was.arm.wrist, is.arm.wrist), distance(was.hand.tip, is.hand.tip), edge.min(opposite)]
 }
 
-/// Angles in `F` to positions in `F`, back to angles in `F`. What comes of it is measured in `f64`.
+/// Angles in `F` to positions in `F`, back to angles in `F`. The differences are measured in `f64`.
 fn round_trip<F: Float + Into<f64>>(pose: [f64; 6]) -> [f64; 3] {
     let pose = pose.map(F::of);
     let Frames { arm, hand } = forward(pose);

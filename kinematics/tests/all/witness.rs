@@ -43,7 +43,8 @@ fn to_witness([t1, t2, t3, t4, t5, t6]: [f64; 6]) -> [f64; 6] {
     [t1, 90.0 - t2, linkage(t2, t3), 90.0 - t4, t5 - 90.0, -t6].map(f64::to_radians)
 }
 
-/// Angles of joints 1 to 6, in the turn round 0 to 180 degrees; joint 6 modulo 180.
+/// Angles of joints 1 to 6 in the turn from -90 to 270 degrees; joint 3 follows from the linkage, joint 6 is modulo
+/// 180.
 fn from_witness(angles: [f64; 6]) -> [f64; 6] {
     let [q1, q2, q3, q4, q5, q6] = angles.map(f64::to_degrees);
     let wrapped = |degrees: f64| (degrees + 90.0).rem_euclid(360.0) - 90.0;

@@ -1,5 +1,5 @@
-//! How a waiting joint engages: measured at rest, given its goal, asked whether it has it, given torque
-//! ([D12](protocol_core::decisions#d12), [D29](protocol_core::decisions#d29)).
+//! How a waiting joint engages: it is measured at rest, its servo is sent its goal, is asked whether it has the goal,
+//! and is given torque ([D12](protocol_core::decisions#d12), [D29](protocol_core::decisions#d29)).
 
 use protocol_core::registers::RegisterFile;
 use protocol_core::registers::map::PROTECTION;
@@ -12,9 +12,9 @@ use crate::servo_bus::Answer;
 use crate::torque_check::{TorqueCheck, TorqueFound};
 
 impl JointState {
-    /// Checks the goal that the servo of a joint shows whose torque is pending ([D12](protocol_core::decisions#d12)).
-    /// Returns how often the goal has to be sent before torque; `None` if it is not known that the servo has it. Then the
-    /// joint waits for its next answer.
+    /// Checks the goal that the servo shows while the torque of its joint is pending
+    /// ([D12](protocol_core::decisions#d12)). Returns how often the goal has to be sent before torque; `None` if it is
+    /// not known that the servo has it. Then the joint waits for its next answer.
     pub(super) fn check_goal(
         &mut self,
         now: Instant,
@@ -24,7 +24,7 @@ impl JointState {
     ) -> Option<u8> {
         let held = answer.torque?;
         if !held.is_on && self.goal.had_torque() {
-            // The servo restarted since it was read on (D29), if a second answer says so.
+            // If a second answer confirms it, the servo has restarted since a read showed its torque on (D29).
             self.torque.doubt();
             if self.torque.answered(Some(false)) == TorqueFound::Lost {
                 self.lose_torque(now);
@@ -47,13 +47,14 @@ impl JointState {
         };
         let stays = may_engage && self.position.is_steady();
         let has_goal = stays && repeats == Some(0) && is_there(answer.reading.position_counts);
-        // A servo with torque follows its goal already. None was sent since a question was not answered.
+        // A servo with torque follows its goal already. No goal was sent since a question was not answered: then send
+        // it once more.
         if held.is_on || has_goal {
             let was_unanswered = !self.torque.is_trusted();
             self.torque = TorqueCheck::ORDERED;
             return Some(was_unanswered.into());
         }
-        // It engages anew where it is now, with the next answer or with this one.
+        // The joint engages anew where it is now, with the next answer or with this one.
         self.drive.lose_torque(true);
         let repeats = repeats.filter(|_| stays)?;
         let angle = self.known_angle()?;
@@ -62,8 +63,9 @@ impl JointState {
         engages.then_some(repeats.max(1))
     }
 
-    /// Where a joint that was measured at `angle` engages. After a restart of the controller alone its servo may hold a
-    /// goal: at another one the joint would sag by the distance at which the servo carries its load.
+    /// Where a joint that was measured at `angle` engages. After a restart of the controller alone, the servo may still
+    /// hold a goal; if it is near, the joint engages at that goal. At `angle` it would sag by the position error at
+    /// which the servo carries the load.
     pub(super) fn place(
         &self,
         answer: &Answer,

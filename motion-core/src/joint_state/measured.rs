@@ -13,7 +13,7 @@ pub(crate) enum Measured {
     ServoChanged,
     /// The filter accepted the reading, and the joint engaged: its servo needs its goal, then a question about it.
     Engaged,
-    /// The joint needs torque, after its goal was sent this often.
+    /// The joint needs torque, after its goal was sent `goals` times.
     TorqueDue { goals: u8 },
     /// An alarm has freed the joint: its servo needs torque-off, which frees nothing and ends a latched overload
     /// ([D28](protocol_core::decisions#d28)).

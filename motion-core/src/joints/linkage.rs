@@ -11,7 +11,8 @@ use crate::limits::linkage_step;
 use crate::motor_state::MotorState;
 
 impl Joints {
-    /// The first register because of which a write is refused against a limit ([D25](protocol_core::decisions#d25)).
+    /// The lowest register for which a limit refuses a write; `None` if no limit refuses it
+    /// ([D25](protocol_core::decisions#d25)).
     pub(crate) fn against_limit(&self, check: &LimitCheck<'_>) -> Option<u8> {
         let enters_servo = self.state != MotorState::Servo
             && check.accepted.value_at(MOTOR_STATE.address) == Some(motor_state::SERVO);
@@ -37,8 +38,8 @@ impl Joints {
     }
 
     /// Lets joints 2 and 3 wait for each other where their step would break the linkage
-    /// ([D25](protocol_core::decisions#d25)). A joint that gives way to an obstacle does not wait: it would go on pushing
-    /// until its servo switches itself off ([D27](protocol_core::decisions#d27)).
+    /// ([D25](protocol_core::decisions#d25)). A joint that gives way to an obstacle does not wait, because it would go
+    /// on pushing until its servo switches itself off ([D27](protocol_core::decisions#d27)).
     pub(super) fn keep_linkage(
         &mut self,
         before: [MicroDegrees; 2],

@@ -77,8 +77,8 @@ fn d12_a_joint_is_not_given_torque_where_it_was_measured_long_ago() {
     assert_eq!(joints.take_torque(true), [None; JOINTS]);
 }
 
-/// A servo pushes with all it has and turns its joint on `from` these counts, while each answer takes five control cycles. Returns
-/// each position, and the goal after it.
+/// A servo at full load turns its joint further, from `from` counts on and by 25 counts each time. Each answer takes
+/// five control cycles. Returns each measured position and the goal after it.
 fn turned_on(joints: &mut Joints, registers: &mut RegisterFile, joint: Joint, from: u16) -> Vec<(u16, u16)> {
     registers.set(SPEED.of(joint), 90);
     let mut step = |(millis, position)| {

@@ -51,7 +51,7 @@ pub enum Question {
 }
 
 impl Question {
-    /// The registers between the torque switch and the measurements.
+    /// The distance of the measurements from the torque switch, in registers.
     const DISTANCE: u8 = register::PRESENT_POSITION - register::TORQUE_SWITCH;
 
     const fn first(self) -> u8 {
@@ -123,7 +123,7 @@ pub struct Bus {
     longest_answers: [u16; JOINTS],
     /// Until when the wire is busy: with an answer on the wire, or with a frame that has no answer.
     busy_until: Instant,
-    /// When the bytes began that have come without a pause of the guard time.
+    /// When the present run of bytes began: bytes without a pause of the guard time between them.
     heard_since: Instant,
     /// When the guard time after the last byte received ends.
     quiet_at: Instant,
@@ -136,8 +136,8 @@ pub struct Bus {
 }
 
 impl Bus {
-    /// An idle bus at `baud` bits per second. A servo has to answer within `timeout` of the last byte sent. A frame follows the byte before it
-    /// after `guard_time` at the earliest.
+    /// An idle bus at `baud` bits per second. A servo has to answer within `timeout` of the last byte sent. A frame
+    /// begins at least `guard_time` after the byte before it.
     #[must_use]
     pub const fn new(baud: u32, timeout: Duration, guard_time: Duration, codes: TorqueCodes) -> Self {
         Self {

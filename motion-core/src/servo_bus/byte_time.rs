@@ -23,7 +23,7 @@ impl ByteTime {
     #[must_use]
     pub fn of(self, count: usize) -> Duration {
         let count = u32::try_from(count).unwrap_or(u32::MAX);
-        // Ten bits of nanoseconds are a hundredth of as many microseconds.
+        // Ten bits of n nanoseconds each take n / 100 microseconds.
         let micros = self.bit_nanos.saturating_mul(count).div_ceil(100);
         Duration::from_micros(u64::from(micros))
     }

@@ -12,7 +12,7 @@
 //! ```
 //!
 //! In the SCS series, 16-bit fields are sent high byte first; STS and SMS servos send the low byte first. This file
-//! does not know timeouts or turns. Its tests are in `tests/all/servo_frames.rs`.
+//! does not know timeouts or transactions. Its tests are in `tests/all/servo_frames.rs`.
 
 mod decoder;
 pub mod error;

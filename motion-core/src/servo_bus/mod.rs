@@ -1,7 +1,7 @@
 //! The servo bus: the wire that connects seven SCS servos, from the master's side.
 //!
 //! ```text
-//!   frame    frames of both directions (no time, no turns)
+//!   frame    frames of both directions (no time, no transactions)
 //!     ▼
 //!   bus      transactions, timeouts    (no angles, no registers of the arm)
 //! ```

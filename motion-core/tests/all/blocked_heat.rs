@@ -11,7 +11,8 @@ const ALARMS: u8 = 197;
 const HEAT: u8 = 1 << 2;
 const MINUTES: u64 = 30;
 
-/// The seconds from the block of joint 1 to the alarm, if there is one, and the temperature at the end.
+/// The seconds from the write of the target to the alarm, if there is one, and the temperature at the end. Joint 1 is
+/// blocked within the first 4 s.
 fn seconds_to_alarm(limit: u8) -> (Option<u64>, u8) {
     let mut rig = Rig::started();
     rig.write(PUSH_LIMIT, &[limit]);

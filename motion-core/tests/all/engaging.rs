@@ -1,4 +1,4 @@
-//! From no torque to torque: what the servos are told in between, at any moment and by a shell of any kind.
+//! From no torque to torque: what is sent to the servos in between, at any moment and by any kind of shell.
 
 use crate::rig::{Rig, STANDARD_COUNTS, ToServos, write};
 use arm_sim::servo::ServoFault;
@@ -20,7 +20,8 @@ fn d12_a_goal_stays_where_the_joint_is_until_it_has_torque() {
         for (joint, counts) in (1..).zip(STANDARD_COUNTS) {
             rig.hand(joint, counts);
         }
-        // The answer with the goal takes 0.55 ms, and has to end within 3 ms: later than that, no torque switch is ever read.
+        // The answer with the goal takes 0.55 ms, and has to end within 3 ms: with a later answer, the torque switch
+        // would never be read.
         let late = ServoFault::Late(Duration::from_micros(phase * 24));
         for (fault, joint) in
             [late, ServoFault::Garbled(2), ServoFault::Garbled(2)].into_iter().zip(Joint::ALL)
@@ -118,7 +119,7 @@ fn restart(lost: usize, hides_goals: bool) -> Rig {
     rig
 }
 
-/// Loses up to five goals in a row, also where servos do not show theirs.
+/// Loses up to five goals in a row, also with servos that do not show their goal.
 fn assert_goals_arrive(engage: impl Fn(usize, bool) -> Rig) {
     for lost in 0..=5 {
         for hides_goals in [false, true] {

@@ -60,7 +60,8 @@ fn d29_after_a_late_call_a_servo_that_restarted_meanwhile_gets_no_old_goal() {
     }
 }
 
-/// How far a joint moves after a late call in which its servo restarted, this long after a moment in a move.
+/// How far a joint moves after a late call in which its servo restarted, in thousandths of a degree. The restart is
+/// `micros` later than the first 100 ms of a move.
 fn moved_after_a_restart(joint: Joint, micros: u64) -> i32 {
     let mut rig = Rig::started();
     rig.plant.set_goal_starts_torque(true);

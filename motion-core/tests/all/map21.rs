@@ -8,7 +8,7 @@ const IK6: [u8; 9] = [0x03, 0xCE, 0x04, 0xB9, 0x04, 0x32, 0x80, 0x80, 0x7F];
 const IK6_FAR: [u8; 9] = [0x05, 0xF4, 0x04, 0xB9, 0x04, 0x32, 0x80, 0x80, 0x7F];
 const IK5: [u8; 6] = [0x04, 0x64, 0x04, 0xC8, 0x04, 0x96];
 const IK5_FAR: [u8; 6] = [0x05, 0x90, 0x04, 0x00, 0x04, 0x64];
-/// IK6 (-50, 185, 50), (0, 0, -1).
+/// The targets of [`IK6`]: the tip at (-50, 185, 50) mm, the tool along (0, 0, -1).
 const IK6_TARGETS: [u8; 7] = [105, 88, 110, 90, 135, 90, 80];
 const ALARM_5: [u8; 7] = [0xAA, 0x77, 0x08, 0x01, 0x05, 0x67, 0xFD];
 const ALARM_6: [u8; 7] = [0xAA, 0x77, 0x08, 0x01, 0x06, 0x27, 0xFC];
@@ -28,7 +28,7 @@ fn with_options(options: u8) -> Rig {
     rig
 }
 
-/// The address, function and count of everything that was sent.
+/// The function, address and count of everything that was sent.
 fn sent(rig: &mut Rig) -> Vec<[u8; 3]> {
     rig.to_host.drain(..).map(|(_, bytes)| [bytes[2], bytes[3], bytes[4]]).collect()
 }
@@ -257,8 +257,8 @@ fn m09_loads_show_which_way_a_joint_pushes() {
     let mut rig = Rig::started();
     rig.run_ms(1_000);
     let loads = rig.read(91, 7);
-    // The level forearm takes 18.8 % of the stall torque of joint 3, less up to 5 % that static friction holds. That is
-    // towards more counts, which are smaller angles: 137 to 188, in steps of 8.
+    // The level forearm takes 18.8 % of the stall torque of joint 3, less up to 5 % that static friction holds. The
+    // load is towards more counts, which are smaller angles: 138 to 188 in 0.1 %, or 17 to 23 steps of 8.
     assert!((128 - 23..=128 - 17).contains(&loads[2]), "{}", loads[2]);
     assert_eq!((loads[0], loads[6]), (128, 128));
 }

@@ -14,7 +14,7 @@ fn encoded(encode: impl FnOnce(&mut ServoFrameBuffer)) -> Vec<u8> {
     buffer.to_vec()
 }
 
-/// What a decoder says, as values that own their bytes.
+/// What a decoder returns, as values that own their bytes.
 type Said = Result<(u8, u8, Vec<u8>), WrongChecksum>;
 
 fn pull_all(decoder: &mut Decoder, said: &mut Vec<Said>) {
@@ -146,7 +146,7 @@ fn a_wrong_checksum_does_not_cost_the_frame_behind_it() {
     let mut bad = encoded(|buffer| ping(buffer, 2));
     bad[4] ^= 0x10;
     assert_eq!(decoded(&[&bad, &good]), [Err(WrongChecksum), Ok((3, 1, vec![]))]);
-    // A frame cut short swallows the beginning of the next one, and gives it back.
+    // A truncated frame takes the first bytes of the next one as its own. The decoder still finds the next one.
     assert_eq!(decoded(&[&bad[..5], &good]), [Err(WrongChecksum), Ok((3, 1, vec![]))]);
 }
 

@@ -90,7 +90,7 @@ proptest! {
     ) {
         let mut at = 500_000;
         let arrivals: Vec<Arrival> = gaps.iter().zip(&angles).map(|(gap, &angle)| { at += gap; (at, angle) }).collect();
-        // Slow joints need longer than the others to arrive.
+        // A slower joint would not arrive within the time that `set_points` simulates.
         let speed = if speed == 0 { 0 } else { speed.max(50) };
         let out = set_points(start, &arrivals, millis * 1_000, speed, phase);
         let most = if speed == 0 { 3_720_000 } else { i32::from(speed) * 19_000 };

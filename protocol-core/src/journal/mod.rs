@@ -28,11 +28,11 @@
 //!   anything and before it returns the settings.
 //! - **Generation and slot give the order**, not a running number. An interrupted record and its replacement would have
 //!   the same number, and the wrong one might become readable later.
-//! - **Only its mark states that a sector is blank.** After an interrupted erase a sector may read as blank. The mark is
-//!   programmed after a complete erase and a check of every word. It contains the generation that the sector is prepared
-//!   for, so an older mark that survives an interrupted erase is not valid. One word is enough: its statement is true
-//!   before its first bit is programmed. An interrupted mark lacks zeros, and an erase adds none. It costs one more
-//!   erase, and it cannot become valid if that erase is interrupted, too.
+//! - **Only its mark states that a sector is blank.** After an interrupted erase a sector may read as blank. The mark
+//!   is programmed after a complete erase and a check of every word. It contains the generation that the sector is
+//!   prepared for, so an older mark that survives an interrupted erase is not valid. One word is enough: the sector is
+//!   blank before the first bit of the mark is programmed. An interrupted mark lacks zeros, and an erase adds none.
+//!   Such a mark costs one more erase, and it cannot become valid if that erase is interrupted, too.
 //! - **A valid mark is revoked before its sector is erased.** Otherwise it might survive an interrupted erase. This
 //!   happens if many starts in a row are interrupted during the move to the spare, until the spare is half full of
 //!   remains. A word behind home's own mark then moves the spare to the next generation.
@@ -182,8 +182,8 @@ impl<F: NorFlash> Journal<F> {
     /// no arm has such an image.)
     ///
     /// # Errors
-    /// [`SaveError::Full`] until the next start. After [`SaveError::Broken`] the next start may find the settings before or
-    /// after this save.
+    /// [`SaveError::Full`] if there is no room before the next start. [`SaveError::Broken`] if the flash does not keep data:
+    /// then the next start may find the settings before or after this save.
     pub fn save(&mut self, image: &Image) -> Result<(), SaveError> {
         if self.newest.as_ref() == Some(image) {
             return Ok(());
@@ -201,12 +201,12 @@ impl<F: NorFlash> Journal<F> {
         if self.broken { 0 } else { free(self.tail.next.slot) + self.tail.spare.map_or(0, free) }
     }
 
-    /// The flash.
+    /// The flash, for a test or a simulator that changes it.
     pub const fn flash_mut(&mut self) -> &mut F {
         &mut self.sectors.0
     }
 
-    /// Returns the flash.
+    /// Ends the journal and returns its flash.
     pub fn release(self) -> F {
         self.sectors.0
     }

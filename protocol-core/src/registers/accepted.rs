@@ -40,7 +40,7 @@ impl Accepted<'_> {
         Some(u16::from_le_bytes([low, high]))
     }
 
-    /// Does the write reach the extended block? The registers before it have one byte, and no minimum.
+    /// Does the write reach the extended block? Only from that block on do registers have two bytes or a minimum.
     #[must_use]
     pub fn is_extended(&self) -> bool {
         usize::from(self.start) + self.values.len() > usize::from(EXTENDED_START)
@@ -57,7 +57,7 @@ impl Accepted<'_> {
     }
 }
 
-/// A byte that function 04 writes, with an offset in sign and magnitude.
+/// Converts a byte that function 04 writes to the value that is stored: an offset becomes sign and magnitude.
 pub(super) fn from_map21(address: u8, byte: u8) -> u8 {
     if map21::OFFSET.holds(address) {
         OFFSET.range.encode_byte(map21::OFFSET.range.decode_byte(byte)).unwrap_or(0)

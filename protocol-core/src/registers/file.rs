@@ -222,7 +222,7 @@ impl RegisterFile {
     }
 }
 
-/// An offset in sign and magnitude as 128 + offset.
+/// Converts an offset from sign and magnitude to 128 + offset.
 fn to_map21(byte: u8) -> u8 {
     map21::OFFSET.range.encode_byte(OFFSET.range.decode_byte(byte)).unwrap_or(0)
 }

@@ -131,8 +131,8 @@ impl Map {
     }
 }
 
-/// The row whose value a read of `address` gives: that of map 2.2, or else that of map 2.1 ([M3](crate::decisions#m3)).
-/// `None` if neither has one.
+/// The row whose value a read of `address` gives ([M3](crate::decisions#m3)): the row of map 2.2 or, if that is missing
+/// or reserved, the row of map 2.1. `None` if neither map has one.
 #[must_use]
 pub fn find_readable(address: u8) -> Option<&'static Register> {
     let open = |row: &&Register| row.access != super::Access::Reserved;

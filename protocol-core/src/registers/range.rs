@@ -81,7 +81,7 @@ impl Range {
         if self.contains(raw) { Some(raw) } else { None }
     }
 
-    /// Decodes the byte of a register that has one.
+    /// Decodes the value of a one-byte register.
     #[must_use]
     pub fn decode_byte(self, byte: u8) -> i16 {
         i16::try_from(self.decode(byte.into())).unwrap_or(0)

@@ -1,5 +1,5 @@
-//! The rules for writes, generated from both tables at compile time. The image holds two bytes per register and map, eight
-//! per value that these two do not check, and none of the tables' text.
+//! The rules for writes, generated from both tables at compile time. The firmware image holds two bytes per register
+//! and map, eight more per value that those two bytes cannot check, and none of the tables' text.
 
 use super::map::{MAP, PRESENT_POSITION, refusal};
 use super::map21::MAP_21;
@@ -106,7 +106,7 @@ struct ValueRule {
 }
 
 impl ValueRule {
-    /// The reason why a write of `values` from `start` on is refused because of this value, if it is (D16, D22).
+    /// The reason why this value refuses a write of `values` from `start` on (D16, D22); `None` if it does not.
     fn refusal(self, start: u8, values: &[u8]) -> Option<u8> {
         let byte = |address: u8| values.get(usize::from(address.checked_sub(start)?)).copied();
         let high = if self.range.width() == 2 { byte(self.address + 1) } else { Some(0) };
@@ -121,7 +121,7 @@ impl ValueRule {
     }
 }
 
-/// The first value because of which a write of `values` from `start` on is refused (D16, D22).
+/// The first value that refuses a write of `values` from `start` on (D16, D22); `None` if none does.
 pub(super) fn first_refused_value(start: u8, values: &[u8]) -> Option<Refused> {
     let refused = |value: &ValueRule| {
         let reason = value.refusal(start, values)?;
@@ -218,7 +218,7 @@ const fn rules<const END: usize>(map: &[Register]) -> [Rule; END] {
     rules
 }
 
-/// The defaults of map 2.1, and over them those of map 2.2 (M3).
+/// The defaults of map 2.1, overwritten by the defaults of map 2.2 (M3).
 const fn defaults() -> [u8; 256] {
     set_defaults(set_defaults([0; 256], MAP_21), MAP)
 }

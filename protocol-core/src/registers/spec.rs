@@ -180,7 +180,7 @@ impl Register {
         address.wrapping_sub(self.address) < self.count
     }
 
-    /// The joint of the value that holds `address`, in a per-joint row.
+    /// The joint whose value holds `address`; `None` if the row is not per joint or does not hold `address`.
     #[must_use]
     pub const fn joint_at(&self, address: u8) -> Option<Joint> {
         let index = address.wrapping_sub(self.address) / self.range.width();
@@ -210,7 +210,7 @@ impl Register {
 }
 
 /// Checks a table at compile time: ascending addresses, ROM before EEPROM before RAM, no overlap, all addresses below
-/// 256, seven registers in each per-joint row, and every default within its range.
+/// 256, only whole values in each row, seven values in each per-joint row, and every default within its range.
 #[must_use]
 pub const fn well_formed(map: &[Register]) -> bool {
     let mut rest = map;

@@ -107,7 +107,7 @@ pub struct Frame<'a> {
     pub data: &'a [u8],
 }
 
-/// Why a frame of full length is rejected.
+/// Why a complete frame is rejected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Defect {

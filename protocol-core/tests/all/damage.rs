@@ -5,7 +5,7 @@ use crate::disturbed_line::{Disturbance, run};
 use crate::stream::GAP_US;
 
 const FRAMES: usize = 1_000_000;
-/// "At most five in a million": what is left is noise that completes to a right checksum by chance.
+/// At most five in a million are lost: where noise happens to form a frame with a correct checksum.
 const MOST_LOST: usize = 5;
 
 fn check(disturbance: Disturbance, most_lost: usize) {

@@ -6,8 +6,8 @@ use protocol_core::time::Instant;
 use protocol_core::wire::frame::{Defect, ParseOutcome, parse};
 use protocol_core::wire::{Deframer, MAX_LENGTH, ToArm, ToHost, deframer};
 
-/// A stretch of a stream that is likely to hold trouble: whole frames, pieces of frames, headers that
-/// promise too much, ranges past the end, noise rich in header bytes.
+/// A part of a stream that is likely to cause errors: whole frames, pieces of frames, headers without their data,
+/// ranges past address 255, noise rich in header bytes.
 fn stretch() -> impl Strategy<Value = Vec<u8>> {
     let noise = prop_oneof![Just(0xAA_u8), Just(0x77), Just(0x06), Just(0x04), Just(0x03), any::<u8>()];
     let function = prop_oneof![Just(3), Just(4), Just(6)];
@@ -30,7 +30,7 @@ fn stretch() -> impl Strategy<Value = Vec<u8>> {
         1 => Just(stream::raw_frame(6, 250, 7, &[1; 7])),
         // A frame inside the data of another one.
         1 => any::<u8>().prop_map(|address| frame(6, address, &frame(3, 54, &[]))),
-        // A frame whose checksum ends like a header begins.
+        // A frame whose last byte is the first byte of a header.
         1 => Just(stream::frame_ending_in_aa()),
     ]
 }
@@ -156,7 +156,7 @@ fn d03_a_frame_inside_a_good_frame_is_data() {
 #[test]
 fn d03_a_frame_lends_its_end_to_the_next_one() {
     let next = frame(3, 54, &[]);
-    // Checksums are unlike for unlike pairs of bytes: one of them makes it a header.
+    // Different pairs of bytes have different checksums, so one pair has the checksum AA 77.
     let pairs = (0..=u16::MAX).map(|pair| frame(6, 0, &pair.to_le_bytes()));
     let ending_in_header = pairs.into_iter().find(|bytes| bytes.ends_with(&[0xAA, 0x77])).unwrap();
     let mut shortest = (0..=255).map(|count| stream::raw_frame(3, 0, count, &[]));

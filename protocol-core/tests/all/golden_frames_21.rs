@@ -113,7 +113,7 @@ const ALARMS: [(u8, [u8; 7]); 3] = [
     (7, [0xAA, 0x77, 0x08, 0x01, 0x07, 0xE6, 0x3C]),
 ];
 
-/// The bytes of a frame, and the only frame that a deframer finds in them.
+/// Encodes a frame, checks that a deframer finds this frame and nothing else in its bytes, and returns the bytes.
 fn both_ways<D: Direction>(
     encode: impl Fn(&mut FrameBuffer),
     check: impl Fn(&mut Deframer<D>),

@@ -1,5 +1,5 @@
-//! D19 on flash that goes bad: wrong bits, cells and sectors that do not take what they are given, and the
-//! emulator's flash, which takes nothing.
+//! D19 on faulty flash: wrong bits, cells and sectors that cannot be programmed or erased, and the emulator's flash,
+//! which never changes.
 
 use crate::journal_world::{End, REAL, World, image, report};
 use flash_model::{Cut, EraseTear, Flash, Operation, ProgramTear, Random};
@@ -45,7 +45,7 @@ fn any_one_wrong_bit_of_a_full_flash_leaves_the_newest_image() {
 fn any_two_wrong_bits_of_the_newest_record_make_no_other_image() {
     let (flash, newest) = saved::<512>(6);
     let (_, before) = saved::<512>(5);
-    // Slot 1 says that there are no settings yet; six saves later it is slot 7.
+    // Slot 1 says that there are no settings yet. After six saves, the newest record is in slot 7.
     let record = 7 * 256..8 * 256;
     let (mut kept, mut lost) = (0, 0);
     for first in record.clone() {
@@ -67,7 +67,7 @@ fn any_two_wrong_bits_of_the_newest_record_make_no_other_image() {
 
 #[test]
 fn a_flash_that_takes_nothing_is_broken_and_the_arm_goes_on() {
-    // The emulator's reads 0 everywhere; one that is write protected may be blank.
+    // The emulator's flash reads 0 everywhere; a write-protected flash may be blank.
     for bytes in [vec![0; 2 * REAL], vec![0xFF; 2 * REAL]] {
         let (mut journal, opened) = Journal::open(Flash::<REAL>::inert(&bytes));
         assert_eq!((opened, opened.image(), journal.room()), (Opened::Broken(None), None, 0));
@@ -87,7 +87,7 @@ fn a_write_protected_flash_gives_its_settings_and_takes_no_others() {
         assert_eq!(journal.save(&newest), if saves == 100 { Err(refusal) } else { Ok(()) });
         assert_eq!(Journal::open(journal.release()).1, opened);
     }
-    // One whose newest record is in doubt, and cannot be made firm.
+    // A flash whose newest record is in doubt, and cannot be made firm.
     let (mut flash, newest) = saved::<REAL>(100);
     flash.flip(101 * 256 + 70);
     let (journal, opened) = Journal::open(Flash::<REAL>::inert(flash.bytes()));
@@ -173,7 +173,7 @@ fn a_save_tries_two_slots_and_no_more() {
     }
 }
 
-/// What was begun in the spare may outrank home at the next start, so nothing is promised in home any more.
+/// A record that was begun in the spare may win over home at the next start, so home accepts no more saves.
 #[test]
 fn a_move_that_fails_is_the_end_of_saving_but_not_of_the_settings() {
     let (mut flash, newest) = saved::<512>(8);

@@ -70,7 +70,7 @@ fn a_power_cycle_takes_600_saves_however_full_the_flash_was() {
         flash.power_up(1);
         let room = Journal::open(flash).0.room();
         least = least.min(room);
-        // All of it, and three that are refused.
+        // As many saves as there is room for, then three that are refused.
         assert_eq!(world.clone().cycle(room + 3, None), End::Quiet);
         assert_eq!(world.cycle(saves, None), End::Quiet);
         saves += 7;
@@ -91,7 +91,7 @@ fn a_full_flash_refuses_and_keeps_what_it_has() {
     assert!(journal.room() >= 600);
 }
 
-/// Home is as full as saves make it, and its spare is not blank: the slots kept for starts are for this.
+/// Home is as full as saves can make it, and the spare is not blank: for this case some slots are reserved for starts.
 #[test]
 fn what_is_in_doubt_is_appended_again_before_anything_is_erased() {
     use Operation::{Erase, Program};

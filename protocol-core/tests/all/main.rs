@@ -1,4 +1,4 @@
-//! Tests of the public face of protocol-core, in one program: one link instead of nine.
+//! Tests of the public face of protocol-core, in one program, so that only one is linked.
 
 #![allow(clippy::indexing_slicing, clippy::panic, clippy::unwrap_used)] // A panic is a failed test.
 

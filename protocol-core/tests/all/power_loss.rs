@@ -1,5 +1,5 @@
-//! D19: the power is cut at every program and every erase, in every way a cell can be left, once and then
-//! again before the first cut is mended. The settings are those before or after, never neither.
+//! D19: the power is cut at every program and every erase, in every way that a cell can be left, once and then again
+//! before the first cut is repaired. The settings found are those before or after a save, and never others.
 //!
 //! `JOURNAL_LONG=1` tries much more, `JOURNAL_SEED=n` the random part from another seed; three cuts in a row
 //! are among the ignored tests. How much was tried is printed (`--nocapture`).
@@ -54,7 +54,7 @@ fn cut_everything_once_in<const SECTOR: usize>(
     let mut tally = Tally::default();
     for saves in cycles {
         let operations = world.operations(saves).len();
-        // It takes long to get to the last operations of a cycle that fills the flash: only those.
+        // A cycle that fills the flash takes long, so the power is cut only at its last operations.
         let from = if saves > 100 { operations - 80 } else { 0 };
         tally.operations += operations - from;
         every_cut(&world, saves, from).for_each(|world| tally.settle(world));
@@ -67,7 +67,7 @@ fn cut_everything_once_in<const SECTOR: usize>(
 #[test]
 fn a_cut_at_every_step_of_a_thousand_updates_of_the_real_flash() {
     let cycles = (0..6 * 44).map(|cycle| [3, 1, 11, 0, 6, 2][cycle % 6]);
-    // Then some that fill it: into the spare, and to its end.
+    // Then cycles that fill the flash: into the spare, and to its end.
     cut_everything_once::<REAL>(cycles.chain([380, 2, 380, 640, 1, 900, 1200, 3]));
 }
 
@@ -168,7 +168,7 @@ fn cuts_at_random_in_long_lives() {
     cut_at_random::<REAL>(4_000 * times, 1_000);
 }
 
-/// What an erase leaves that was cut is chance: many chances for each kind.
+/// The result of an interrupted erase is random, so each kind is tried many times.
 fn cut_erases<const SECTOR: usize>(chances: usize) -> u64 {
     let mut world = World::<SECTOR>::new();
     let mut cases = 0;
@@ -197,7 +197,7 @@ fn a_cut_erase_loses_nothing_whatever_it_leaves() {
     assert!(cut_erases::<REAL>(if is_long() { 200 } else { 30 }) >= 1_500);
 }
 
-/// A flash whose home is full, and whose spare is half full of what moves there left that were cut.
+/// A flash whose home is full, and whose spare is half full of the remains of interrupted moves.
 fn spare_full_of_remains() -> World<512> {
     let mut world = World::new();
     assert_eq!(world.cycle(9, None), End::Quiet);
@@ -205,7 +205,7 @@ fn spare_full_of_remains() -> World<512> {
     world
 }
 
-/// Cuts start after start while it moves to the spare, until it does not try any more.
+/// Cuts the power in each start while it moves to the spare, until a start does not try to move.
 fn fill_spare_with_remains(world: &mut World<512>) {
     while world.operations(0).starts_with(&[Operation::Program; 8]) {
         assert_eq!(world.cycle(0, Some(torn_after(4))), End::Cut);

@@ -78,7 +78,7 @@ fn d15_d16_d17_every_range_of_addresses_in_every_state() {
     for (lock, state) in [(0, 0), (0, 1), (0, 2), (1, 0), (1, 1), (1, 2)] {
         let fresh = file(lock, state);
         let before = snapshot(&fresh);
-        // All zero and all one are values of every register but a few; the others find each one's limit.
+        // 0 and 1 are in the range of nearly every register; the other values test the limits.
         for filler in [0, 1, 2, 4, 8, 17, 51, 70, 100, 181, 0x81, 0x91, 255] {
             let values = [filler; 255];
             for address in 0..=255_u8 {

@@ -107,7 +107,7 @@ fn d05_silence_counts_even_while_nobody_pulls() {
     let at = Instant::from_micros;
     let good = frame(6, 46, &[90; 7]);
     let mut deframer = Deframer::<ToArm>::new(deframer::gap(115_200));
-    // Two silences in a row, so that the second must not make the first forgotten.
+    // Two silences in a row: the second must not replace the first.
     for (number, part) in (0..).zip(good.chunks(6)) {
         let now = at(number * LONG_SILENCE_US);
         deframer.push(now, &[]);
@@ -143,7 +143,7 @@ fn d05_a_search_behind_a_head_goes_on_where_it_stopped() {
         bytes[28] ^= checksum;
         bytes
     };
-    // The head fails, or proves right, while one of three frames behind it is told.
+    // The head turns out to be wrong, or right, after one of three frames behind it was returned.
     for (checksum, expected) in [(1, 2), (0, 1)] {
         let outer = spoiled(checksum);
         let mut deframer = Deframer::<ToArm>::new(deframer::gap(115_200));

@@ -192,7 +192,7 @@ impl FlashRegisters for ChipModel {
     fn supply_is_low(&self) -> bool {
         let settled = self.micros.get().wrapping_sub(self.monitor_settled) <= u32::MAX / 2;
         let millivolts = self.millivolts();
-        // Until then it reports a good supply.
+        // Before it has settled, the monitor reports a good supply.
         settled && self.monitor.borrow_mut().as_mut().is_some_and(|monitor| monitor.is_low(millivolts))
     }
 

@@ -2,7 +2,7 @@
 
 use super::{ENVELOPE, MAX_FRAME, ServoFrame, UNCOUNTED, checksum};
 
-/// A frame of full length has a wrong checksum.
+/// A complete frame has a wrong checksum.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct WrongChecksum;
@@ -50,7 +50,7 @@ impl Decoder {
     /// Records that a damaged byte came behind all bytes so far. It belongs to no frame.
     pub fn push_damaged(&mut self) {
         if self.head < self.damaged_at {
-            // Only one position is kept: drop the bytes between the two.
+            // Only one position is kept: drop the bytes between the two damaged ones.
             self.buffer.truncate(self.damaged_at);
         }
         self.damaged_at = self.buffer.len();
@@ -92,7 +92,8 @@ impl Decoder {
     }
 }
 
-/// Parses the frame at the beginning of `bytes`. No servo has the id FF, so after FF FF FF the header is one byte on.
+/// Parses the frame at the beginning of `bytes`. No servo has the id FF, so in FF FF FF the header begins one byte
+/// later.
 fn parse(bytes: &[u8]) -> DecodeOutcome<'_> {
     match bytes {
         [] | [0xFF] | [0xFF, 0xFF] => DecodeOutcome::Incomplete,

@@ -1,5 +1,5 @@
-//! Random motions without an obstacle, as what a host writes: those of `protection/free_motion.rs`, and of the worlds with other
-//! seeds.
+//! Random motions without an obstacle, as the writes of a host. `protection/free_motion.rs` runs some seeds, and the
+//! torture program runs others.
 
 /// What a host writes, and the time until it goes on, in milliseconds.
 pub struct Step {

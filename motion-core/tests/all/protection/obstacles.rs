@@ -41,7 +41,7 @@ fn d27_a_joint_at_a_wall_gives_way_is_blocked_and_stays() {
             rig.plant.set_wall(joint, stiff_wall(wall));
             rig.write(31 + number, &[speed]);
             rig.write(45 + number, &[target]);
-            // The push is over its limit since it arrived at the wall.
+            // Wait until the joint is at the wall and has pushed harder than its limit.
             let mut over = 0;
             for _ in 0..3_000 {
                 rig.run_ms(1);
@@ -64,7 +64,7 @@ fn d27_a_joint_at_a_wall_gives_way_is_blocked_and_stays() {
                 rig.run_ms(1);
                 swing = swing.max((rig.plant.angle(joint) - before).abs());
             }
-            // A payload pulls joint 3 the same way as its spring.
+            // A payload pulls joint 3 in the same direction as its spring.
             let most = if payload == 0 { 4_000 } else { 5_500 };
             let is_held = lasting <= 750 && swing <= most && target_now < target;
             if !is_held || blocked != bit(number) || moving != 0 || rig.get(ALARMS) != 0 {
@@ -115,7 +115,7 @@ fn d27_a_lift_at_full_load_keeps_its_limit_while_the_target_is_far_away() {
         rig.write(29, &[1]);
         rig.run_ms(100);
         [3, 5].into_iter().for_each(|number| rig.plant.let_go(joint(number)));
-        // The joint turns, but so slowly that its push is over the limit. Its servo gives all it has.
+        // The joint turns, but so slowly that its push is over the limit. Its servo is at full load.
         rig.write(50, &[0]);
         let (mut over, mut longest) = (0, 0);
         for _ in 0..4_000 {
@@ -170,7 +170,8 @@ fn d27_the_next_target_clears_the_bit_and_tries_again() {
 fn d27_a_joint_that_carries_more_than_its_limit_sinks_slowly() {
     let mut rig = Rig::started();
     let joint = joint(3);
-    // Level, with 400 g: 65 % and friction. A limit of 60 % and 5 % more carry it.
+    // The forearm is level and carries 250 g. The limit is 2 to 3 % below the load that this takes, so limit + 5 %
+    // carries it.
     rig.plant.set_load(250);
     rig.run_ms(1_000);
     let carried = rig.plant.load(joint).abs();

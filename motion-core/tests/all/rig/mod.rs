@@ -11,7 +11,7 @@ pub const STANDARD_POSE: [u8; 7] = [90, 90, 65, 90, 90, 90, 80];
 /// [`STANDARD_POSE`] in servo counts.
 pub const STANDARD_COUNTS: [u16; 7] = [511, 445, 684, 511, 512, 512, 1008];
 
-/// A frame for the servos, taken apart.
+/// A decoded frame for the servos.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum ToServos {
     Ask(u8),
@@ -33,7 +33,7 @@ pub struct Rig {
     pub torque_questions: Vec<(u64, u8)>,
     pub vacuum: Vec<(u64, Vacuum)>,
     pub saved: Vec<Image>,
-    /// What becomes of the next save.
+    /// The state of the storage after the next save.
     pub storage: Storage,
     /// The id of a servo, and how many of the next frames with a goal for it are lost.
     pub lost_goals: (u8, usize),
@@ -134,7 +134,7 @@ impl Rig {
         }
     }
 
-    /// One turn of the shell's loop: says when the next is due.
+    /// One turn of the shell's loop. Returns when the next is due, in microseconds.
     fn turn(&mut self) -> u64 {
         let now = self.now();
         self.controller.host_bytes(now, &[]);
@@ -208,7 +208,7 @@ impl Rig {
         self.send(&write(address, values));
     }
 
-    /// Asks over the wire and gives the values of the answer.
+    /// Reads registers over the wire and returns their values.
     pub fn read(&mut self, address: u8, count: u8) -> Vec<u8> {
         let before = self.to_host.len();
         self.send(&frame(3, address, count, &[]));
@@ -242,7 +242,7 @@ impl Rig {
         self.read(46, 7)
     }
 
-    /// Runs until no joint moves, and says for how many milliseconds.
+    /// Runs until no joint moves, and returns how many milliseconds that took.
     pub fn run_until_still(&mut self) -> u64 {
         let start = self.now_us;
         while self.controller.registers().get(243) != 0 {
@@ -287,7 +287,7 @@ pub fn reply(address: u8, values: &[u8]) -> Vec<u8> {
     frame(3, address, u8::try_from(values.len()).expect("at most 255"), values)
 }
 
-/// Replaces the goal in an answer from the torque switch on by 0, if torque is off.
+/// Sets the goal to 0 in an answer that begins with the torque switch, if torque is off.
 fn hide_goal(answer: &mut [u8]) {
     if let [_, _, _, length, _, torque, _, high, low, .., checksum] = answer
         && *length >= 24

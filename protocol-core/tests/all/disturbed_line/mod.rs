@@ -1,10 +1,10 @@
 //! Good frames on a line that is disturbed in one of eight ways: how many are lost, and how late the rest come
 //! (D3, D4).
 //!
-//! The line runs at 115 200 baud. A disturbance is followed by a burst of good frames, then silence. A frame is
-//! late by the time from its own last byte to its coming out, less what was still to come of its burst.
+//! The line runs at 115 200 baud. A disturbance is followed by a burst of good frames, then silence. The delay of a
+//! frame is the time from its last byte until the deframer returns it, less the duration of its burst.
 
-#![allow(dead_code)] // Each who runs it uses its part.
+#![allow(dead_code)] // Each program that includes this module uses a part of it.
 
 use flash_model::Random;
 use protocol_core::time::{Duration, Instant};
@@ -14,7 +14,7 @@ use super::stream::{GAP_US, Received, drain, frame};
 
 const BYTE_US: u64 = 87;
 const BURST: usize = 4;
-/// A sender may pause for 100 ms inside a frame.
+/// Shorter than the 100 ms that a sender may pause inside a frame.
 const PAUSE_US: u64 = 5_000;
 
 /// What happens to the line.
@@ -28,7 +28,7 @@ pub enum Disturbance {
     FalseLongHeader,
     /// Inside good frames.
     Pauses,
-    /// Nothing, but no pause either: as fast as the line goes.
+    /// No disturbance, and no pause between the frames.
     BackToBack,
 }
 
@@ -53,7 +53,7 @@ impl Disturbance {
         }
     }
 
-    /// What it makes of a frame.
+    /// The bytes that it sends in place of the frame `victim`.
     fn spoil(self, random: &mut Random, mut victim: Vec<u8>) -> Vec<u8> {
         let place = random.index(victim.len());
         match self {
@@ -86,7 +86,7 @@ fn any_frame(random: &mut Random, victim: bool) -> Vec<u8> {
     frame([3, 4, 6][random.index(3)], address, &data)
 }
 
-/// What a run came to.
+/// The result of a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Tally {
     pub frames: usize,
@@ -169,7 +169,7 @@ impl Line {
         self.hears(&[]);
     }
 
-    /// Bytes come, or none do.
+    /// Pushes bytes, or silence if there are none, and counts the frames that come out.
     fn hears(&mut self, bytes: &[u8]) {
         self.deframer.push(Instant::from_micros(self.now), bytes);
         let mut received = Vec::new();
@@ -177,14 +177,14 @@ impl Line {
         received.into_iter().for_each(|said| self.came_out(&said));
     }
 
-    /// A disturbance may let its victim through: that is not among those that wait.
+    /// A disturbance may let its victim through. The victim is not among the expected frames.
     fn came_out(&mut self, said: &Received) {
         let Received::Frame(bytes) = said else { return };
         let Some(skipped) = self.waiting[self.done..].iter().position(|expected| expected == bytes) else {
             return;
         };
         let place = self.done + skipped;
-        // The frame that is being sent came out with its last byte.
+        // A frame without an entry is being sent: it came out with its last byte.
         let end = self.ends.get(place).copied().unwrap_or(self.now);
         self.tally.lost += skipped;
         self.tally.worst_delay_us =

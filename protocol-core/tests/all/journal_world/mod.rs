@@ -1,10 +1,9 @@
 //! An arm's settings over many power cycles, and what must hold in every one of them (D19):
 //!
 //! - a start finds what was last acknowledged, or something that was attempted since;
-//! - what a start has told stays so, until something else is acknowledged or attempted;
+//! - all later starts find the same, until another save is acknowledged or attempted;
 //! - a save is refused only where no room was promised;
-//! - nothing is erased but by a start, which erases two sectors and programs 18 words at most; a save
-//!   programs eight.
+//! - only a start erases: it erases two sectors and programs 18 words at most; a save programs eight.
 #![allow(dead_code)] // Each test program uses its part.
 
 use std::cell::RefCell;
@@ -19,7 +18,7 @@ const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 /// The sectors of the reference board.
 pub const REAL: usize = 16_384;
 
-/// The journal's access to a flash that the test looks at, too.
+/// The journal's access to a flash that the test inspects, too.
 #[derive(Debug)]
 pub struct Access<'a, const SECTOR: usize>(pub &'a RefCell<Flash<SECTOR>>);
 
@@ -64,7 +63,7 @@ pub fn image(number: u64) -> Image {
 pub enum End {
     /// The power was switched off when all was done.
     Quiet,
-    /// It was cut.
+    /// The power was cut during the cycle.
     Cut,
 }
 
@@ -74,13 +73,13 @@ pub struct World<const SECTOR: usize> {
     pub flash: RefCell<Flash<SECTOR>>,
     /// What the next start may find.
     possible: Vec<Option<Image>>,
-    /// How many images there were.
+    /// How many images were saved, or were begun to be saved.
     pub images: u64,
     /// Decides how marginal bits read.
     pub seed: u64,
-    /// The most that a start here erased and programmed.
+    /// The largest number of erased sectors and of programmed words in one start.
     pub most: (usize, usize),
-    /// The power cycles that were, for the report of a failure.
+    /// The power cycles so far, for the report of a failure.
     past: Vec<(usize, Option<Cut>)>,
 }
 
@@ -145,7 +144,7 @@ impl<const SECTOR: usize> World<SECTOR> {
         End::Quiet
     }
 
-    /// In a life of many power cycles, only those since the last quiet one tell why something failed.
+    /// Forgets the past power cycles after a quiet one: only those since then can explain a failure.
     pub fn forget_past(&mut self, end: End) {
         if end == End::Quiet {
             self.past.clear();
@@ -161,7 +160,7 @@ impl<const SECTOR: usize> World<SECTOR> {
         flash.history().to_vec()
     }
 
-    /// Some quiet power cycles: the checks that they bring.
+    /// Runs some quiet power cycles, with their checks.
     pub fn settle(&mut self) {
         for saves in [0, 1, 0] {
             assert_eq!(self.cycle(saves, None), End::Quiet);
@@ -239,7 +238,7 @@ pub fn every_cut<const SECTOR: usize>(
     })
 }
 
-/// Says what was tried, as a row of the table that `cargo xtask torture` prints. What failed has panicked.
+/// Prints what was tried, as a row of the table that `cargo xtask torture` prints. A failure has panicked before.
 pub fn report(tried: &str, many: &str) {
     println!("\njournal, {tried}\t{many}\tnothing");
 }
