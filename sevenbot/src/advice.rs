@@ -77,7 +77,7 @@ fn join(group: Option<&str>) -> String {
     }
 }
 
-/// Advice if frames arrive damaged: the baud rate is right.
+/// Advice if damaged frames arrive. The baud rate is right, since frames are recognized.
 const NOISE: &[&str] = &[
     "frames arrive damaged: is every plug tight, and the ground of the computer and the arm common?",
     "lay the cable away from motors and their supply (interference), or use a shorter one",

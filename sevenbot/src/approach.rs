@@ -1,4 +1,4 @@
-//! The way to the first point of a stream or a recording: refused where it is long, unless it is asked for.
+//! The way to the first point of a stream or a recording. A long way is refused, unless the caller asks for it.
 //!
 //! ```text
 //!   Standing: where the arm is ──┐
@@ -26,18 +26,18 @@ pub const NEAR_DEGREES: f64 = 5.0;
 const SLOW_DEGREES_PER_SECOND: f64 = 30.0;
 /// The largest speed of a blend, as a factor of its mean speed.
 const PEAK: f64 = 1.5;
-/// Time between two moments of an approach as a recording. A playback in whole degrees has steps as long.
+/// Time between two moments of an approach as a recording: the longest step of a playback in whole degrees.
 const MOMENT: Duration = Duration::from_millis(50);
 
-/// What to do where the first point is not where the arm stands.
+/// What to do if the first point is not where the arm stands.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ApproachRule {
-    /// Refuse a point further than 5 degrees. A nearer one is approached at 30 degrees/s.
+    /// Refuse a point that is further than 5 degrees for any joint. Approach a nearer one at up to 30 degrees/s.
     #[default]
     Near,
     /// Go there from anywhere in this time, or longer if a joint would exceed its speed.
     Within(Duration),
-    /// Go there from anywhere at 30 degrees/s, for a movement that was planned from where the arm is.
+    /// Go there from anywhere at up to 30 degrees/s, for a movement that was planned from where the arm is.
     Slowly,
 }
 
@@ -53,7 +53,7 @@ pub struct Standing {
 }
 
 impl Standing {
-    /// From registers 0 to 255. Those of a block that the firmware does not have are 0.
+    /// From registers 0 to 255. Registers of a block that the firmware lacks are 0.
     #[must_use]
     pub fn of(registers: &Snapshot) -> Self {
         let speeds = registers.joints(&SPEED).map(|steps| Speed::from_steps(steps).unwrap_or(Speed::MAXIMUM));
@@ -67,7 +67,7 @@ impl Standing {
         Self { measured: angles(&FINE_POSITION), targets, speeds }
     }
 
-    /// At the last moment of a recording, after it was played.
+    /// An arm that stands at this pose, as after a recording was played to its last moment.
     pub(crate) fn at_pose(pose: [FineAngle; 7], speeds: [Speed; 7]) -> Self {
         let targets = pose.map(FineAngle::degrees);
         Self { measured: targets.map(Some), targets, speeds }
@@ -77,7 +77,7 @@ impl Standing {
 /// A first point that is too far away.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StartTooFar {
-    /// The joints that are further than 5 degrees from the point: where they stand and where the point is, in degrees.
+    /// Each joint that is further than 5 degrees from the point, its angle, and the angle of the point, in degrees.
     pub joints: Vec<(Joint, f64, f64)>,
     /// Is it the way from the end of a recording back to its start, rather than from where the arm stands?
     pub is_seam: bool,
@@ -145,7 +145,7 @@ impl Approach {
         Ok(Self { from, to: *first, duration })
     }
 
-    /// How long it takes.
+    /// The duration of the way; 0 if the arm is at the point.
     #[must_use]
     pub const fn duration(&self) -> Duration {
         self.duration
@@ -167,7 +167,8 @@ impl Approach {
         point
     }
 
-    /// The way as a recording, for an arm that takes no stream. Every joint has an angle at its end.
+    /// The way as a recording that ends at `end`, for an arm that takes no stream. A joint without a first point has the angle
+    /// of `end` all the way.
     #[must_use]
     pub fn recording(&self, end: Moment) -> Recording {
         let count = u32::try_from(self.duration.as_millis() / MOMENT.as_millis()).unwrap_or(u32::MAX);
@@ -184,7 +185,7 @@ impl Approach {
     }
 }
 
-/// The joints of a stream that got a point already. The first point of a joint may come later than those of others.
+/// The joints of a stream that have had a point. Joints may get their first points at different times.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FirstPoints {
     has_point: [bool; 7],
@@ -209,8 +210,8 @@ fn check_near(standing: &Standing, first: &FineTargets) -> Result<(), StartTooFa
     if far.is_empty() { Ok(()) } else { Err(StartTooFar { joints: far, is_seam: false }) }
 }
 
-/// Where the way begins. A joint at rest begins at its target, since a loaded servo droops: its set-point makes no step. A
-/// joint on its way begins where it is measured.
+/// Where the way begins. A joint within 5 degrees of its target begins at the target, so that its set-point makes no step
+/// although a loaded servo droops. Any other joint begins where it is measured.
 fn starts(standing: &Standing) -> [f64; 7] {
     let mut from = standing.targets;
     for (target, measured) in from.iter_mut().zip(standing.measured) {
@@ -281,7 +282,7 @@ mod tests {
             for number in 0..=count {
                 let point = way.at(step * number).map(|angle| angle.expect("all have one").degrees());
                 for (now, before) in point.iter().zip(before) {
-                    // Hundredths of a degree are 2 degrees/s here.
+                    // Rounding to 0.01 degrees in a step of 5 ms adds up to 2 degrees/s.
                     let speed = (now - before).abs() / step.as_secs_f64();
                     assert!(speed <= limit + 2.01, "{steps} {seconds}: {speed}");
                 }

@@ -51,7 +51,7 @@ pub struct Arm {
     reports: ReportQueue,
 }
 
-/// A read that is not waited for: a stream asks for the arm's health between its points.
+/// A read that the caller does not wait for. A stream reads the arm's health this way, between its points.
 struct BackgroundRead {
     id: RequestId,
     wanted: Span,
@@ -74,7 +74,7 @@ impl Arm {
         Self::open_with(path, ArmOptions { baud, ..ArmOptions::default() })
     }
 
-    /// As [`Arm::open`], with other timeouts.
+    /// As [`Arm::open`], with timeout, attempts and register map as the options say.
     ///
     /// # Errors
     /// The port cannot be opened, no device answers, or another device answers.
@@ -193,7 +193,7 @@ impl Arm {
     /// [D17](protocol_core::decisions#d17)). The arm does not answer a write. [`Arm::write_checked`] reads the
     /// registers back.
     ///
-    /// If both maps are necessary, there are several frames. A write to a register that only map 2.1 has ends the
+    /// Registers that need both maps are written in several frames. A write to a register that only map 2.1 has ends the
     /// reports of map 2.2 ([M4](protocol_core::decisions#m4)). [`Arm::write_checked`] starts them again.
     ///
     /// # Errors
@@ -208,8 +208,8 @@ impl Arm {
         self.flush()
     }
 
-    /// Our firmware shows the offsets in the encoding of the map that was written last, maybe by another program (M5). A
-    /// write of 0 registers makes that the map of this view.
+    /// Selects the encoding of the offsets. Our firmware shows them in the encoding of the map that was written last, maybe by
+    /// another program (M5). A write of 0 registers in this view's map selects that map.
     fn claim_offset_encoding(&mut self) {
         self.link.write(&WriteFrame { map: self.view.map, address: 0, values: Vec::new() });
     }
@@ -283,7 +283,7 @@ impl Arm {
         self.flush()
     }
 
-    /// Forgets the last background question: its answer tells what was before.
+    /// Gives up the last background question, because its answer would be out of date.
     pub(crate) fn forget_background_question(&mut self) {
         if let Some(read) = self.background.take() {
             self.link.cancel(read.id);
@@ -322,7 +322,7 @@ impl Arm {
         }
     }
 
-    /// As [`Self::flush`], with the bytes that wait in the line: reports, and late replies.
+    /// As [`Self::flush`], and takes the bytes that wait in the line: reports and late replies.
     fn take_waiting(&mut self) -> Result<(), Error> {
         loop {
             let has_bytes = self.link.receive(Duration::ZERO)?;

@@ -17,7 +17,7 @@ use protocol_core::registers::map21::Map;
 pub struct ArmOptions {
     /// Baud rate of the port. The arm starts with the rate in its register 12.
     pub baud: u32,
-    /// The wait for one attempt. A reply is waited for as long as all attempts together.
+    /// The timeout of one attempt. A read fails after `attempts` times this.
     pub reply_timeout: Duration,
     /// Attempts for a read, at least one. With more than one, a read is sent again whenever its reply is overdue, so a lost
     /// reply costs much less than `reply_timeout`: [`Patience`](host_link::Patience). A read changes nothing, so repeating it is

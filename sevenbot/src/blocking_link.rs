@@ -20,7 +20,7 @@ pub(crate) struct BlockingLink {
 }
 
 impl BlockingLink {
-    /// `reports`: the registers that reports may have.
+    /// `reports`: the ranges of registers that a report may hold.
     pub(crate) fn new(line: Box<dyn HostLine>, baud: u32, reports: &'static [Span]) -> Self {
         let start = line.now();
         let link = HostLink::new(LinkOptions { baud, reports });
@@ -63,7 +63,7 @@ impl BlockingLink {
         }
     }
 
-    /// The next event but [`HostEvent::Wait`]; `None` if none comes before `deadline`.
+    /// The next event other than [`HostEvent::Wait`]; `None` if there is none before `deadline`.
     pub(crate) fn next(&mut self, deadline: Option<Instant>) -> Result<Option<HostEvent>, PortError> {
         loop {
             let until = match self.poll()? {
@@ -80,9 +80,10 @@ impl BlockingLink {
         }
     }
 
-    /// Hands over the bytes that have arrived, or arrive within `timeout`. `false` if there are none.
+    /// Hands the bytes that have arrived, or arrive within `timeout`, to the link. `false` if there are none.
     pub(crate) fn receive(&mut self, timeout: Duration) -> Result<bool, PortError> {
-        // The planned end of the wait: after a suspension the actual end is later, and bytes may wait in the line.
+        // The planned end of the wait. After a suspension the clock is later, and a reply may wait in the line: at that later
+        // time the link would give the read up.
         let end = self.time_at(self.line.now() + timeout);
         let bytes = self.line.receive(timeout)?;
         self.received.bytes += bytes.len();
@@ -106,7 +107,7 @@ impl BlockingLink {
         self.line.sleep(duration);
     }
 
-    /// The counts since the last call.
+    /// The counts since the last call. `earlier_frames` counts the good frames before that.
     pub(crate) fn take_received(&mut self) -> ReceiveCounts {
         let received = std::mem::take(&mut self.received);
         self.received.earlier_frames = received.earlier_frames + received.other_frames;

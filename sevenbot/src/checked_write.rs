@@ -60,7 +60,7 @@ impl Arm {
 
     /// Runs `work` with the EEPROM lock open. Closes the lock afterwards, also after a failure.
     ///
-    /// A controller that restarts meanwhile has closed the lock. Then the restart is the reason, and not the lock:
+    /// A restart of the controller meanwhile closes the lock. Then the error names the restart as the cause, not the lock:
     ///
     /// ```
     /// use sevenbot::map::DEVICE_ID;
@@ -81,7 +81,7 @@ impl Arm {
     /// ```
     ///
     /// # Errors
-    /// Those of `work`, or the lock did not open or close: as [`Arm::write_checked`].
+    /// Those of `work`, and those of [`Arm::write_checked`] if the lock does not open or close.
     pub fn with_open_lock<T>(
         &mut self,
         work: impl FnOnce(&mut Self) -> Result<T, WriteError>,
@@ -95,7 +95,8 @@ impl Arm {
         Ok(done)
     }
 
-    /// Runs `work`. If the controller has restarted, that is the reason why it did not take a value.
+    /// Runs `work`. If the controller restarted meanwhile, the restart is the cause for all registers that did not take their
+    /// values.
     fn told_of_restart<T>(
         &mut self,
         before: Option<StatusBlock>,
@@ -160,8 +161,8 @@ impl Arm {
         (ends && hertz != 0 && !is_written).then(|| (row.address, vec![hertz]))
     }
 
-    /// Before a write that lets the motors of the maker's firmware drive the joints: makes the present positions the
-    /// targets. Ours does that by itself (D13); the maker's drives each joint to its last target.
+    /// Makes the present positions the targets before a write that makes the maker's firmware drive the joints. It would drive
+    /// each joint to its last target. Our firmware sets the targets itself (D13).
     fn prepare_torque(&mut self, writes: &[(u8, Vec<u8>)]) -> Result<(), Error> {
         let new_state = |(address, values): &(u8, Vec<u8>)| {
             values.get(usize::from(MOTOR_STATE.address.checked_sub(*address)?)).copied()
@@ -179,7 +180,7 @@ impl Arm {
         writes: &[&(u8, Vec<u8>)],
         locked: bool,
     ) -> Result<Vec<Snapshot>, Error> {
-        // The maker's firmware changes a locked setting until the next restart, and does not store it.
+        // The maker's firmware takes a locked setting, but only until the next restart: it does not store it. So do not send it.
         let skips_settings = locked && self.identity().firmware() == Firmware::Makers;
         for (address, values) in writes {
             if !(skips_settings && cause_from_access(*address, locked) == Some(MismatchCause::Locked)) {
@@ -207,7 +208,8 @@ fn compare(found: &Snapshot, wanted: &[u8], cause: impl Fn(u8, u16) -> MismatchC
         .collect()
 }
 
-/// The raw values of a snapshot with their addresses: two-byte registers whole, but for halves at its ends.
+/// The raw values of a snapshot with their addresses. A two-byte register is one value, unless the snapshot begins or ends
+/// in its middle.
 fn raw_values(snapshot: &Snapshot) -> Vec<(u8, u16)> {
     let mut values = Vec::new();
     let mut addresses = snapshot.span().addresses().peekable();

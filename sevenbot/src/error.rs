@@ -77,7 +77,7 @@ pub enum Error {
         span: Span,
         /// The number of attempts.
         attempts: u32,
-        /// The timeout of each attempt. The reply was waited for as long as all of them together.
+        /// The timeout of each attempt. The read failed after `attempts` times this.
         waited: Duration,
         /// What was received instead.
         received: ReceiveCounts,

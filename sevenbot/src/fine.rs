@@ -15,7 +15,7 @@ use crate::identity::Firmware;
 use crate::joints::frames_of;
 use host_link::{Snapshot, Span};
 
-/// The period of a stream, and its watchdog: a program that ends its stream switches both off.
+/// The set-point period and the watchdog of a stream. A program that ends its stream switches both off.
 const PERIOD_AND_WATCHDOG: Span = Span::between(&SET_POINT_PERIOD, &HOST_WATCHDOG);
 
 impl Arm {
@@ -73,9 +73,9 @@ impl Arm {
         self.without_set_point_period(|arm| arm.write_all_checked(&fine_frames(targets)))
     }
 
-    /// Runs `work` while fine targets are no points of a stream (D23), and restores the set-point period, also after a
-    /// failure. A stream whose program has ended it meanwhile, with its watchdog, stays off. Only for an arm with the extended
-    /// block.
+    /// Runs `work` with the set-point period 0, so that fine targets are not points of a stream (D23). Then restores the
+    /// period, also after a failure, unless the other program has ended its stream meanwhile. Only for an arm with the
+    /// extended block.
     pub(crate) fn without_set_point_period<T>(
         &mut self,
         work: impl FnOnce(&mut Self) -> Result<T, WriteError>,
@@ -97,14 +97,14 @@ impl Arm {
             return Ok(());
         }
         self.write_checked(SET_POINT_PERIOD.address, &before.word(SET_POINT_PERIOD.address).to_le_bytes())?;
-        // It may have ended between that read and the write.
+        // The stream may have ended between the read and the write.
         if self.is_stream_over(before)? {
             self.write_checked(SET_POINT_PERIOD.address, &[0, 0])?;
         }
         Ok(())
     }
 
-    /// True if the program that streamed has changed its watchdog since `before`.
+    /// Has the other program ended its stream? Then it has changed the watchdog since `before`.
     fn is_stream_over(&mut self, before: &Snapshot) -> Result<bool, WriteError> {
         let watchdog = |registers: &Snapshot| registers.byte(&HOST_WATCHDOG);
         Ok(watchdog(&self.read_span(PERIOD_AND_WATCHDOG)?) != watchdog(before))

@@ -34,7 +34,7 @@ impl FineState {
     /// The registers of a state.
     pub const REGISTERS: Span = Span::between(&FINE_POSITION, &LOAD);
 
-    /// From a read of [`Self::REGISTERS`]. What the snapshot does not hold is 0.
+    /// From a read of [`Self::REGISTERS`]. Registers that the snapshot lacks count as 0.
     #[must_use]
     pub fn new(snapshot: &Snapshot) -> Self {
         let signed = |row: &Register| snapshot.words(row).map(u16::cast_signed);

@@ -9,7 +9,7 @@
 //! register tells the two apart, but a joint is measured if one of these holds:
 //!
 //! - Register 242 lists a missing servo, because the arm lists one only after start-up.
-//! - The joint is at rest with target 0, which is no default.
+//! - The joint is at rest with target 0, which is not the default of any joint.
 //! - 700 ms have passed since the first read.
 
 use std::time::Duration;
@@ -28,7 +28,7 @@ use host_link::{Snapshot, Span};
 pub const START_UP_TIME: Duration = Duration::from_millis(700);
 /// Time between two reads during start-up.
 pub(crate) const POLL_PERIOD: Duration = Duration::from_millis(20);
-/// A joint this near to its target has arrived: a loaded servo stops a few degrees short.
+/// A joint within this distance of its target has arrived: a loaded servo stops a few degrees short.
 const AT_TARGET_DEGREES: u8 = 5;
 
 /// Why the base of a relative step is unknown.
@@ -41,7 +41,7 @@ pub enum StepBaseError {
     /// Its servo does not answer.
     #[error("its servo does not answer")]
     Silent,
-    /// Its target is the default of power-up, and the joint is elsewhere.
+    /// Its target may be the default of power-up, and the joint is elsewhere.
     #[error("it is at {present}°, and its target of {target}° may be the default of power-up")]
     PowerUpTarget {
         /// The target in degrees.

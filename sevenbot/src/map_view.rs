@@ -7,7 +7,7 @@
 //!
 //! In map 2.1 the present positions and their report frequency have other addresses, and the offsets another encoding.
 //! Everything else that map 2.2 names is the same. The registers that only map 2.1 has keep their addresses. This
-//! project's firmware serves both maps, so a register that only map 2.1 has is written by its function.
+//! project's firmware serves both maps, so the function code of map 2.1 writes a register that only map 2.1 has.
 
 use std::ops::RangeInclusive;
 
@@ -24,11 +24,11 @@ use protocol_core::registers::{Access, Register};
 use crate::identity::Firmware;
 use host_link::{Snapshot, Span};
 
-/// The maker's firmware shows this time until one is written: the low byte of its 1000 ms.
+/// The value of a time register in the maker's firmware until a time is written: the low byte of 1000 ms.
 const STOCK_TIME_AT_START: u8 = 232;
 /// 1000 ms as a value of the register.
 const ONE_SECOND: u8 = 10;
-/// In map 2.1 a stored offset of 0 is 128. 0 and 255 mean that there is none.
+/// Map 2.1 stores an offset as 128 + offset. 0 and 255 mean that no offset is stored.
 const OFFSET_ZERO: u8 = 128;
 /// A byte that is no offset in any encoding of map 2.1.
 const NO_OFFSET: u8 = 64;
@@ -66,8 +66,8 @@ impl MapView {
         (!is_only_map21(address) || has_map21) && (!is_ours || self.firmware == Firmware::Ours)
     }
 
-    /// Does a write there make the arm move at once, whatever part of a position it covers? Ours moves only when a frame
-    /// covers a whole position (M7).
+    /// Does a write to this register make the arm move at once, even if it covers only a part of a position? Ours moves only
+    /// when a frame covers a whole position (M7).
     pub(crate) fn starts_inverse(self, address: u8) -> bool {
         self.firmware != Firmware::Ours && self.map == Map::V21 && is_inverse(address)
     }
@@ -83,14 +83,14 @@ impl MapView {
         }
     }
 
-    /// What a read of [`MapView::read_span`] gives for these registers.
+    /// The values of these registers of map 2.2, from the answer to a read of [`MapView::read_span`].
     pub(crate) fn view(self, answer: &Snapshot, span: Span) -> Snapshot {
         let value = |address| self.value(address, answer.at(self.address(address)));
         Snapshot { address: span.address(), values: span.addresses().map(value).collect() }
     }
 
-    /// The frames that give these values to registers. One frame if the arm has a function that writes them all. Registers
-    /// that map 2.1 uses for something else are left out.
+    /// The frames that write these values. One frame if one function code of the arm writes them all. Registers whose
+    /// addresses map 2.1 uses for something else are left out.
     pub(crate) fn writes(self, address: u8, values: &[u8]) -> Vec<WriteFrame> {
         if values.is_empty() {
             return vec![WriteFrame { map: self.map, address, values: Vec::new() }];
@@ -112,8 +112,7 @@ impl MapView {
         frames
     }
 
-    /// Does a write to these registers end the reports of [`FEEDBACK_FREQUENCY`], although none of map 2.1 were asked for
-    /// (M4)?
+    /// Does this write end the reports of [`FEEDBACK_FREQUENCY`] (M4) without starting reports of map 2.1?
     pub(crate) fn ends_reports(self, address: u8, values: &[u8]) -> bool {
         let starts_others = |frame: &WriteFrame| {
             [ANGLE_FEEDBACK_FREQUENCY, LOAD_FEEDBACK_FREQUENCY].iter().any(|row| {
@@ -126,7 +125,8 @@ impl MapView {
         self.map == Map::V22 && of_map21.peek().is_some() && !of_map21.any(starts_others)
     }
 
-    /// The map for the registers of a write that both maps have: that of the other registers, so that one frame holds all.
+    /// The map for those registers of a write that both maps have. It is the map of the other registers, so that one frame
+    /// holds all.
     fn default_map(self, address: u8, count: usize) -> Map {
         let has = |test: &dyn Fn(u8) -> bool| (address..=u8::MAX).take(count).any(test);
         let is_only_map22 = |address| FEEDBACK_FREQUENCY.holds(address) || PRESENT_POSITION.holds(address);
@@ -141,12 +141,12 @@ impl MapView {
         self.map == Map::V21 || self.firmware == Firmware::Ours && is_only_map21(address)
     }
 
-    /// In map 2.1 the present positions have the addresses of the tip.
+    /// Is this register left out of writes? In map 2.1 the addresses of the present positions belong to the tip.
     fn skips(self, address: u8) -> bool {
         self.map == Map::V21 && (PRESENT_POSITION.holds(address) || self.starts_inverse(address))
     }
 
-    /// The registers that a report may have.
+    /// The ranges of registers that a report may hold.
     pub(crate) const fn reports(self) -> &'static [Span] {
         match self.map {
             Map::V22 => &REPORTS,
@@ -154,7 +154,7 @@ impl MapView {
         }
     }
 
-    /// Where the arm has this register.
+    /// The arm's own address of this register of map 2.2.
     fn address(self, address: u8) -> u8 {
         let moved = [(&FEEDBACK_FREQUENCY, &ANGLE_FEEDBACK_FREQUENCY), (&PRESENT_POSITION, &PRESENT_ANGLE)];
         let new = moved.into_iter().find(|(old, _)| self.map == Map::V21 && old.holds(address));

@@ -6,8 +6,8 @@
 //!                                        └──▶ RunStep: points and frames to send, or until when to wait
 //! ```
 //!
-//! The blocking [`Player`](crate::moves::Player) and the page in a browser are shells round it. Times are those since any
-//! instant of one clock.
+//! The blocking [`Player`](crate::moves::Player) and the page in a browser are shells round it. All times of the clock count
+//! from the same instant.
 
 use std::time::Duration;
 
@@ -22,8 +22,8 @@ use crate::stream::{PaceCounts, StreamPace};
 
 /// The measurements go on for this time after the end of a path, because servos lag.
 const TAIL: Duration = Duration::from_millis(300);
-/// After a longer pause of the program the movement goes on where it paused. The arm has stopped there, and a later point would
-/// make it leap.
+/// After a longer pause of the program the movement goes on where it paused. The arm has stopped there, and would leap to a
+/// later point.
 const LONGEST_PASSED_OVER: Duration = Duration::from_millis(200);
 /// After a longer pause the movement is over. A person may rely on an arm that has stopped.
 const LONGEST_PAUSE: Duration = Duration::from_secs(1);
@@ -169,7 +169,7 @@ impl MovementRun {
             return RunStep::Paused(lateness);
         }
         if lateness > LONGEST_PASSED_OVER {
-            // What is due now was due before the pause.
+            // Go on with the point that was due when the pause began.
             self.base = self.along_at(due);
             self.pace.restart(now);
         }

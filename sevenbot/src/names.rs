@@ -101,8 +101,8 @@ fn one_joint(row: &'static Register, joint: &str) -> Result<Span, NameError> {
     span.ok_or(NameError::NotPerJoint(row))
 }
 
-/// The registers of a row that a read of the row's addresses shows: of a row that only map 2.1 has, those that map 2.2
-/// does not use.
+/// The registers of a row that a read shows. For a row that only map 2.1 has, these are the addresses that map 2.2 does
+/// not use.
 fn shown(row: &Register) -> Span {
     let is_shown = |address: &u8| MAP.contains(row) || find_readable(*address) == Some(row);
     let addresses = || Span::of(row).addresses().filter(is_shown);
@@ -110,7 +110,8 @@ fn shown(row: &Register) -> Span {
     addresses().next().and_then(|first| Span::new(first, count)).unwrap_or(Span::NONE)
 }
 
-/// The row of this name. Map 2.1 is searched only for a name that is not the beginning of any in map 2.2.
+/// The row of this name. A whole name counts in both maps. A shortened one is searched in map 2.1 only if no name of map
+/// 2.2 begins with it.
 fn row(name: &str) -> Result<&'static Register, NameError> {
     let wanted = name.to_ascii_uppercase().replace('-', "_");
     let rows =

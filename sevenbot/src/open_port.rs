@@ -54,8 +54,8 @@ impl OpenPort {
 }
 
 impl OpenPort {
-    /// For how many bytes a read may ask. On Windows it may wait until all are there: that it returns with the first ones is a
-    /// rule for one combination of timeouts, which Wine and some drivers lack.
+    /// The number of bytes that a read asks for. On Windows a read may wait until all of them have arrived: only one combination
+    /// of timeouts makes it return with the first ones, and Wine and some drivers lack that rule.
     fn readable_length(&self, longest: usize) -> serialport::Result<usize> {
         if !cfg!(windows) {
             return Ok(longest);

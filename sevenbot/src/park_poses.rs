@@ -4,7 +4,7 @@
 //!   AB46DBA59495 _ 90 0 90 48.5 _ _       chip id, then joints 1 to 7 in degrees; _ stays as it is
 //! ```
 //!
-//! `$XDG_CONFIG_HOME/7bot/park-poses`, or `~/.config/7bot/park-poses`; on Windows `%APPDATA%\\7bot\\park-poses`.
+//! `$XDG_CONFIG_HOME/7bot/park-poses`, or `~/.config/7bot/park-poses`; on Windows `%APPDATA%\7bot\park-poses`.
 
 use std::env;
 use std::fs;

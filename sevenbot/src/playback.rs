@@ -11,8 +11,8 @@ use crate::fine_angle::FineAngle;
 use crate::recording::{Moment, Recording};
 use crate::units::{Angle, MoveTime, Speed};
 
-/// The longest segment of an even movement. A speed has steps of 1.9 degrees/s, so in a longer segment the joint would
-/// arrive early.
+/// The longest segment of an even movement. A speed is rounded up to a step of 1.9 degrees/s, so in a longer segment the
+/// joint would arrive early.
 pub(crate) const MAX_SEGMENT: Duration = Duration::from_millis(50);
 /// Joints move faster than necessary by this factor, so that they catch up after a late frame.
 const SPEED_RESERVE: f64 = 1.2;
@@ -61,8 +61,8 @@ impl Step {
     }
 }
 
-/// The steps that play a recording `factor` times as fast, from its first pose. The arm arrives at the last target one
-/// segment after the last step.
+/// The steps that play a recording `factor` times as fast, from its first pose. A step is due at the start of its segment.
+/// The last step is due at the end of the last segment, and repeats the last target.
 #[must_use]
 pub fn steps(recording: &Recording, factor: f64) -> Vec<Step> {
     let points = segments(recording, factor);
@@ -152,7 +152,7 @@ fn interpolate(from: Angle, to: Angle, share: f64) -> Angle {
     Angle::from_register((from + (to - from) * share).round() as u8)
 }
 
-/// The slowest speed that covers the degrees in this time; the maximum if none does.
+/// The slowest speed that covers the degrees in this time with [`SPEED_RESERVE`]; the maximum if no lower one does.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,

@@ -23,7 +23,7 @@ use crate::recording::{Moment, Recording};
 pub struct PointPath {
     /// Times start at 0 and are scaled.
     moments: Vec<Moment>,
-    /// The moment before the last point.
+    /// The index of the moment at or before the last point.
     index: usize,
 }
 
@@ -42,8 +42,8 @@ impl PointPath {
         self.moments.last().map_or(Duration::ZERO, |last| last.time)
     }
 
-    /// The pose at a time, not earlier than the time before; the last pose after the end. The pump is that of the moment
-    /// before. `None` without a moment.
+    /// The pose at `time`, which must not be earlier than in the last call; after the end, the last pose. The pump has the
+    /// state of the moment at or before `time`. `None` if the path has no moments.
     pub fn at(&mut self, time: Duration) -> Option<Moment> {
         while self.moments.get(self.index + 1).is_some_and(|next| next.time <= time) {
             self.index += 1;

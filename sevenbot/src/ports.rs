@@ -62,7 +62,8 @@ pub fn available() -> Vec<PortInfo> {
     ports
 }
 
-/// The servers of this user, and the serial ports that none of them holds: each arm once. [`probe`] asks them.
+/// The servers of this user, and the serial ports that none of them holds, so that each arm is listed once. [`probe`] takes
+/// this list.
 #[must_use]
 pub fn reachable() -> Vec<PortInfo> {
     let served = servers();
@@ -117,7 +118,7 @@ pub fn probe(ports: Vec<PortInfo>, baud: u32) -> Vec<ProbeResult> {
 
 fn ask(name: &str, baud: u32) -> Result<(Identity, u8), OpenError> {
     let mut arm = match Address::parse(name) {
-        // Replies of a server may have to wait for those to other programs.
+        // Through a server, replies may have to wait for replies to other programs. So the timeout is the longer default.
         Some(_) => Arm::open_with(name, ArmOptions { baud, ..ArmOptions::default() })?,
         None => open_quickly(name, baud)?,
     };
@@ -135,7 +136,7 @@ fn open_quickly(name: &str, baud: u32) -> Result<Arm, OpenError> {
 /// Calls `on_rate` with each rate before trying it.
 ///
 /// # Errors
-/// No rate is answered: the error of the last one. Or the port cannot be opened.
+/// The arm answers at no rate: the error of the last rate. Or the port cannot be opened.
 pub fn find_baud(name: &str, mut on_rate: impl FnMut(u32)) -> Result<Arm, OpenError> {
     let mut last = OpenError::NotFound;
     for baud in BAUD_RATES {

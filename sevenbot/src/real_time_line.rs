@@ -8,9 +8,9 @@ use arm_sim::{Simulation, SimulationConfig};
 use crate::error::PortError;
 use crate::host_line::HostLine;
 
-/// A port that answers is asked again after this time: less than a byte at 9,600 baud.
+/// Time between two looks for received bytes: less than that of a byte at 9,600 baud.
 const POLL_PERIOD: Duration = Duration::from_millis(1);
-/// How long the arm has been on when its line opens: its servos are found and measured.
+/// How long the arm has been on when its line opens, so that its servos are measured.
 const ON_BEFORE: Duration = Duration::from_secs(1);
 
 /// The seed of the arm, if the name of a port is `sim` (seed 1) or `sim:SEED`.
@@ -31,8 +31,8 @@ pub fn simulated_port(name: &str) -> Option<u64> {
 
 /// The host's end of the line of a simulated arm, whose time is that of the computer.
 ///
-/// The arm lives as long as the line, with factory settings. While nobody uses the line the arm stands still in time; the
-/// next use lets it catch up.
+/// The arm exists as long as the line, with factory settings. The simulation runs only while the line is used; each use
+/// first lets it catch up with the computer's clock.
 ///
 /// ```
 /// use sevenbot::simulated::RealTimeLine;
@@ -60,7 +60,7 @@ impl RealTimeLine {
         Self { simulation, opened: Instant::now() }
     }
 
-    /// Lets the arm live until now.
+    /// Runs the simulation until now.
     fn catch_up(&mut self) {
         let lived = Duration::from_micros(self.simulation.now().as_micros());
         self.simulation.advance((ON_BEFORE + self.opened.elapsed()).saturating_sub(lived).into());

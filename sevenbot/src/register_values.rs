@@ -49,7 +49,8 @@ pub enum ValueError {
 /// ```
 ///
 /// # Errors
-/// The numbers are too few, too many or out of range. The maker's firmware takes those, so they are refused here.
+/// The span holds half of a two-byte register, or the numbers are too few, too many or out of range. The range is checked
+/// here, because the maker's firmware does not check it.
 pub fn bytes(span: Span, values: &[i32]) -> Result<Vec<u8>, ValueError> {
     let registers = registers(span)?;
     let mut bytes = Vec::new();

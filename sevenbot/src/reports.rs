@@ -14,7 +14,7 @@ use crate::map_view::{MapView, REPORTS};
 use crate::units::Angle;
 use host_link::{Snapshot, Span};
 
-/// Reports kept until the caller takes them: 20 s at the highest rate (D14). The oldest are dropped first.
+/// Reports kept until the caller takes them: 20 s at 50 Hz, the highest rate of map 2.2 (D14). The oldest are dropped first.
 const REPORTS_KEPT: usize = 1_000;
 
 /// A report has seven bytes besides its values, all of ten bits, and reports fill at most half of the line (D14).
@@ -76,7 +76,7 @@ impl Report {
 pub(crate) struct ReportQueue(VecDeque<Report>);
 
 impl ReportQueue {
-    /// Keeps a report that arrived at `now`, if it is one of this arm.
+    /// Keeps a report that arrived at `now`, if the map of this arm has such a report.
     pub(crate) fn keep(&mut self, map: Map, report: &Snapshot, view: MapView, now: Instant) {
         if map != view.map || !view.reports().contains(&report.span()) {
             return;
@@ -109,7 +109,7 @@ pub(crate) fn report_period(firmware: Firmware, hertz: u8, content: u8, baud: u3
     };
     let bits = BITS_PER_BYTE * (REPORT_OVERHEAD + u32::from(span.count()));
     match firmware {
-        // It sends when more than 1000 ms / hertz have passed.
+        // The maker's firmware sends a report when more than 1000 ms / hertz have passed.
         Firmware::Makers => Duration::from_millis(u64::from(1_000 / hertz) + 1),
         Firmware::Ours | Firmware::Unknown => Duration::from_secs(1) / hertz.min(baud / bits).max(1),
     }

@@ -22,9 +22,9 @@
 //! # }
 //! ```
 //!
-//! Time passes only while the arm is asked or slept for, and in [`SharedSimulation::with`]. So a program may think as long
-//! as it likes, and gives the same result on every machine. [`RealTimeLine`] is an arm in the time of the computer: the port
-//! `sim` of the programs.
+//! Virtual time passes only while the program waits for a reply, in [`Arm::sleep`], and where a call of
+//! [`SharedSimulation::with`] advances it. So a program may compute as long as it likes, and gives the same result on every
+//! machine. [`RealTimeLine`] is an arm in the time of the computer: the port `sim` of the programs.
 
 use std::io::ErrorKind;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -64,10 +64,10 @@ pub struct SharedSimulation {
     clock: Arc<Mutex<HostClock>>,
 }
 
-/// The clock of the host line. It goes on when the arm's time is set back.
+/// The clock of the host line. It goes on evenly when a restore changes the arm's time.
 #[derive(Debug, Default)]
 struct HostClock {
-    /// The time that restores took back, less the time that they skipped, in microseconds.
+    /// How far this clock is ahead of the arm's time, in microseconds, because of restores.
     ahead: i64,
     /// When the cable of the host line is pulled.
     unplugged: Option<Duration>,
@@ -93,8 +93,8 @@ impl SharedSimulation {
         self.clock().unplugged = Some(time);
     }
 
-    /// Puts another simulation in the place of this one, such as a copy of before. The clock of the host line goes on
-    /// without a leap, so that due times and timeouts stay what they are.
+    /// Replaces the simulation, for example by an earlier copy. The clock of the host line goes on without a step, so that due
+    /// times and timeouts stay valid.
     pub fn restore(&self, other: Simulation) {
         self.with(|simulation| {
             let (before, after) = (simulation.now().as_micros(), other.now().as_micros());
@@ -105,7 +105,7 @@ impl SharedSimulation {
         });
     }
 
-    /// How often it was restored.
+    /// The number of calls of [`Self::restore`].
     #[must_use]
     pub fn restores(&self) -> u64 {
         self.clock().restores
@@ -126,13 +126,13 @@ impl SharedSimulation {
         if is_unplugged { Err(PortError::Lost(ErrorKind::BrokenPipe)) } else { Ok(()) }
     }
 
-    /// Does something with the simulation, while no time passes for the arm.
+    /// Calls `work` with the simulation. No time passes for the arm, unless `work` advances it.
     pub fn with<T>(&self, work: impl FnOnce(&mut Simulation) -> T) -> T {
-        // A panic in `work` leaves a simulation that can go on.
+        // After a panic in `work` the simulation can go on, so a poisoned lock is no error.
         work(&mut self.simulation.lock().unwrap_or_else(PoisonError::into_inner))
     }
 
-    /// The host's end of its line.
+    /// The host's end of the simulation's line.
     #[must_use]
     pub fn line(&self) -> SimulatedLine {
         SimulatedLine { simulation: self.clone(), start: Instant::now() }
@@ -143,7 +143,7 @@ impl SharedSimulation {
 #[derive(Clone, Debug)]
 pub struct SimulatedLine {
     simulation: SharedSimulation,
-    /// The virtual time 0.
+    /// The time of the line's clock at virtual time 0.
     start: Instant,
 }
 

@@ -40,8 +40,8 @@ impl Arm {
     }
 }
 
-/// Two readings of the counter of frames that follow each other are at most this far apart, if they are a few seconds apart: more
-/// than 2 s of the shortest frames at 115200 baud.
+/// The largest increase of the counter of frames between two successive readings a few seconds apart: more than 2 s of the
+/// shortest frames at 115200 baud.
 const FRAMES_BETWEEN_READINGS: u32 = 4_096;
 
 /// Has the controller restarted between two readings of its counter of frames? A restart sets the counter to 0. So the second
@@ -49,7 +49,7 @@ const FRAMES_BETWEEN_READINGS: u32 = 4_096;
 /// that the arm can have accepted since the first reading, besides 4,096.
 ///
 /// A restart remains undetected
-/// - if the first reading was less than 4,096 and `frames` before the counter wraps,
+/// - if the first reading was less than 4,096 + `frames` before the counter wraps,
 /// - if the arm has accepted more frames since the restart than before it,
 /// - at all readings that are so far apart that `frames` reaches the range of the counter: 37 s at 115200 baud.
 pub(crate) fn has_restarted(before: u16, after: u16, frames: u32) -> bool {
@@ -106,7 +106,7 @@ impl StatusBlock {
         self.moving() & joint.bit() != 0
     }
 
-    /// The reason of the last refusal (see [`crate::map::refusal`]), and the register concerned.
+    /// The reason of the last refusal (see [`crate::map::refusal`]), and the register concerned; `None` without a refusal.
     #[must_use]
     pub fn last_refusal(&self) -> Option<(u8, u8)> {
         let reason = self.0.byte(&LAST_REFUSAL);

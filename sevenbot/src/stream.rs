@@ -199,7 +199,8 @@ impl<'a> SetPointStream<'a> {
         Ok(())
     }
 
-    /// Does the arm follow? Asks it ten times a second, and never waits for its answer. Call it at least that often.
+    /// Does the arm follow? Asks it up to ten times a second, without waiting for the answer. Waits only after a fault, to read
+    /// its cause. Call it at least ten times a second.
     ///
     /// # Errors
     /// A joint of the stream is blocked, let go or silent, the supply was lost, the controller restarted, the motors are off,
@@ -283,17 +284,17 @@ impl<'a> SetPointStream<'a> {
 impl Drop for SetPointStream<'_> {
     fn drop(&mut self) {
         if let Some(before) = self.before.take() {
-            // After an error: there may be no arm any more.
+            // Ignore a failure: after an error the connection may be lost.
             let _ = self.arm.write(STREAM_REGISTERS.address(), &before);
         }
     }
 }
 
 impl Arm {
-    /// Switches off period and watchdog of a stream whose program is gone: the watchdog has acted, and no program has
-    /// written it since. Otherwise it would stop the moves of programs that do not send all the time. Its reports are
-    /// switched off, too, and speeds that it left at the maximum get their default: without points, the next target would
-    /// be approached at 372 degrees/s. Returns whether there was such a stream.
+    /// Switches off the set-point period and the watchdog of a stream whose program is gone: the watchdog has acted, and no
+    /// program has written it since. Otherwise the watchdog would stop the moves of programs that do not send all the time.
+    /// Also switches reports off, and sets speeds that the stream left at the maximum to their default: otherwise the arm would
+    /// approach the next target at 372 degrees/s. Returns whether there was such a stream.
     ///
     /// # Errors
     /// As [`Arm::write_checked`]: the period or the watchdog may still be on.
@@ -306,9 +307,9 @@ impl Arm {
         Ok(is_abandoned)
     }
 
-    /// Sends nothing until a watchdog that is set has acted, if no other program keeps it from that (D24). Then
-    /// [`Arm::end_abandoned_stream`] finds the stream of a program that was killed a moment ago. Without a watchdog it does
-    /// not wait.
+    /// Sends nothing for the time of the arm's watchdog, so that it acts unless another program sends (D24). Then
+    /// [`Arm::end_abandoned_stream`] finds the stream of a program that was killed a moment ago. Does not wait if the watchdog
+    /// is off or has acted.
     ///
     /// # Errors
     /// As [`Arm::read`].
@@ -336,7 +337,7 @@ fn put_speeds_right(arm: &mut Arm) -> Result<(), WriteError> {
     arm.write_all_checked(&[&[(SPEED.address, speeds)][..], &no_reports].concat())
 }
 
-/// Has the watchdog acted, and was not written since?
+/// Has the watchdog acted, and has no program written it since?
 fn is_left_behind(arm: &mut Arm) -> Result<bool, Error> {
     Ok(arm.status()?.is_some_and(|status| status.faults() & fault::HOST_SILENT != 0))
 }

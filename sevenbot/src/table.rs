@@ -14,7 +14,7 @@ pub fn settings() -> impl Iterator<Item = &'static Register> {
     rows().filter(is_shown).filter(|row| row.region == Region::Eeprom && row.access == Access::ReadWrite)
 }
 
-/// The rows of both maps, those that mean the same once.
+/// The rows of both maps. A row that is the same in both appears once.
 pub fn rows() -> impl Iterator<Item = &'static Register> {
     MAP.iter().chain(only_map21())
 }
@@ -152,7 +152,7 @@ pub const fn access(access: Access) -> &'static str {
     }
 }
 
-/// The range of a row; `None` if a read-only row takes any byte.
+/// The range of a row; `None` for a row that cannot be written and may hold any byte.
 #[must_use]
 pub fn range(row: &Register) -> Option<(i32, i32)> {
     let is_any_byte = row.range == Range::UpTo(u8::MAX) && row.access != Access::ReadWrite;

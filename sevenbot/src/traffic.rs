@@ -128,7 +128,7 @@ impl Traffic {
 #[derive(Clone, Debug, Default)]
 pub struct TrafficParser {
     waiting: Vec<u8>,
-    /// So many of the waiting bytes are noise.
+    /// The number of waiting bytes, from the first one on, that are noise.
     noise: usize,
 }
 

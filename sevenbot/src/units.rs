@@ -71,7 +71,7 @@ impl Speed {
     /// The largest speed of at most this many degrees/s, 1.9 to 190. `None` outside of that.
     #[must_use]
     pub fn at_most(degrees_per_second: f64) -> Option<Self> {
-        // A speed that was computed is that of its step, whatever its last digits are.
+        // Tolerates rounding errors, so that the computed speed of a step finds this step.
         const ROUNDING: f64 = 0.05;
         let mut speeds = (1..=100).map(Self);
         let found = speeds.rfind(|speed| speed.degrees_per_second() <= degrees_per_second + ROUNDING);

@@ -109,7 +109,7 @@ pub fn is_log(text: &[u8]) -> bool {
     HEADS.iter().any(|head| text.starts_with(head.as_bytes()))
 }
 
-/// The bytes in a log or a recorded session. What else a session holds is left out.
+/// The bytes in a log or a recorded session. Other entries of a session are left out.
 ///
 /// # Errors
 /// The number of the first line that is no entry.

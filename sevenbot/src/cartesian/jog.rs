@@ -1,6 +1,7 @@
 //! Small steps of the tip along axes, with the direction of the tool kept: jogging.
 //!
-//! Whole degrees are millimetres apart. So the exact position is kept from step to step, and steps do not add up errors.
+//! Poses in whole degrees are millimetres apart. So a jog keeps the exact position from step to step, and rounding errors do
+//! not add up.
 
 use kinematics::{Frames, forward};
 
@@ -52,11 +53,11 @@ pub enum JogRefusal {
 }
 
 impl Jog {
-    /// A step of so many millimetres. It goes on from the jog `before` if the arm's targets are still those of that jog,
-    /// else from the position of the targets. A guard checks the way there, too; `None`: there is none.
+    /// A step by `millimetres`. It starts at the exact position of the jog `before` if the arm's targets are still those of
+    /// that jog, otherwise at the position of the targets. The guard checks the end and the way there; `None`: no guard.
     ///
     /// # Errors
-    /// Why the arm does not reach the new position, or may not.
+    /// The new position is out of reach, or the guard does not allow it or the way there.
     pub fn step(
         before: Option<Self>,
         targets: [Angle; 7],

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!   start, end, speed ──▶ TipPath: tip and tool at any fraction of the line
-//!       each 5 ms, at most 0.5 mm ──▶ angles of the same branch ──▶ reach, jumps and speeds checked
+//!       10 or more times a period, each 0.5 mm ──▶ angles of the same branch ──▶ reach, jumps and speeds checked
 //!       each period ──▶ whole degrees, or hundredths ──▶ Moment, and its distance from the line
 //! ```
 
@@ -42,7 +42,7 @@ const IN_LINE: f64 = 90.0;
 pub struct StraightLine {
     /// The pose at the start.
     pub start: TipPose,
-    /// Its length, in millimetres.
+    /// The length of the line, in millimetres.
     pub length_mm: f64,
     /// The duration.
     pub duration: Duration,
@@ -105,7 +105,7 @@ impl StraightLine {
         })
     }
 
-    /// The targets, joint 1 first, each a period of the resolution or a little less after the one before.
+    /// The targets in the order of time, joint 1 first. The time between two is a period of the resolution, or a little less.
     pub fn targets(&self) -> impl Iterator<Item = [FineAngle; 7]> {
         self.recording.moments().map(|moment| moment.pose)
     }
@@ -114,7 +114,7 @@ impl StraightLine {
 /// The division of a line in time.
 struct LineTiming {
     duration: Duration,
-    /// Targets after the first.
+    /// The number of targets after the first.
     periods: u32,
     /// Checks in a period.
     checks: u32,
@@ -198,7 +198,8 @@ impl LineTiming {
     }
 }
 
-/// The guard along a line. The targets in whole degrees have a check of their own: they are up to 3 mm from the line.
+/// The guard along a line. Targets in whole degrees are checked as well as the exact angles, since they are up to 3 mm from
+/// the line.
 struct GuardedLine<'a> {
     path: &'a TipPath,
     guard: Option<Guard>,
@@ -266,7 +267,7 @@ fn solved(
         angles.iter().zip(before).map(|(angle, before)| (angle - before).abs()).fold(0.0, f64::max)
     };
     let free = |mut angles: Angles| {
-        // In line with the forearm, the roll is free: joint 4 stays.
+        // With the tool in line with the forearm, any angle of joint 4 is a solution. It keeps its own.
         if let ([_, _, _, t4, t5], [_, _, _, before, _]) = (&mut angles, before)
             && (*t5 - IN_LINE).abs() < 1e-6
         {

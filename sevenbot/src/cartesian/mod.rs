@@ -4,16 +4,16 @@
 //!   angles of the joints ──▶ TipPose: tip, tool, wrist
 //!
 //!   tip, tool ──▶ TipTarget: whole degrees of joints 1 to 5     or TipRefusal: reason and nearest point
-//!   tip, tool, speed ──▶ Line: a straight line as moments    or StraightLineError: place and reason
-//!   step along axes ──▶ Jog: the same, from the position of the step before
+//!   tip, tool, speed ──▶ StraightLine: a recording    or StraightLineError: place and reason
+//!   step along axes ──▶ Jog: position and targets, from the exact position of the previous step
 //!   poses, ways of the joints ──▶ Guard: above the table, out of the base
 //! ```
 //!
 //! Origin: the base axis at the height of the top plate. x is to the right, y forward, z up. The tip is the point where
 //! the axis of joint 6 meets the outer face of its disc. The tool direction points from the wrist to the tip.
 //!
-//! The geometry comes from [`kinematics`], the step of a servo from [`motion_core::calibration`]. This module does not talk to
-//! the arm.
+//! The geometry comes from [`kinematics`], the angle of a servo count from [`motion_core::calibration`]. This module does not
+//! talk to the arm.
 
 use std::fmt;
 
@@ -114,8 +114,8 @@ impl TipPose {
         Self { tip: hand.tip, tool: hand.tool, wrist: arm.wrist }
     }
 
-    /// The largest error of a position computed from angles that are known in steps, in millimetres: each joint may be half a
-    /// step away.
+    /// The largest error, in millimetres, of a position that is computed from rounded angles: each joint may be off by half a
+    /// step.
     #[must_use]
     pub fn rounding_mm([t1, t2, t3, t4, t5, t6, _]: [FineAngle; 7], step: AngleStep) -> f64 {
         let angles = [t1, t2, t3, t4, t5, t6].map(FineAngle::degrees);

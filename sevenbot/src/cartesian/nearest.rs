@@ -1,8 +1,9 @@
 //! The nearest point within reach, rounded to tenths of a millimetre so that the rounded point is within reach too.
 //!
 //! If the wrist limits the reach, [`nearest_tip`] gives the point. If the bend of the hand or the guard limits it, the set
-//! of points has no simple shape. Then a grid search finds a point: coarse over the whole reach, then finer around the
-//! best. All points of its grids are in tenths, because at a thin edge of the set none may be in tenths beside an exact point.
+//! of allowed points has no simple shape. Then a grid search finds a point: coarse over the whole reach, then finer around
+//! the best. All grid points are in tenths, because at a thin edge of the set an exact point may have no allowed neighbour
+//! in tenths.
 
 use kinematics::ik6;
 use kinematics::nearest::nearest_tip;
@@ -11,14 +12,15 @@ use super::guard::Guard;
 use super::target::TipTarget;
 use super::{Vector, rounded};
 
-/// Points in a millimetre.
+/// Grid points in a millimetre.
 const TENTHS: f64 = 10.0;
-/// The coarsest grid, in millimetres, and how many of its points are on each side of the middle. Halves of it are the finer grids.
+/// The spacing of the coarsest grid, in millimetres, and the number of its points on each side of the middle. Each finer grid
+/// has half the spacing.
 const COARSE: f64 = 256.0 * FINE;
 const COARSE_STEPS: i32 = 16;
 /// The middle of the coarsest grid: above the shoulder.
 const MIDDLE: Vector = Vector::new(0.0, 0.0, 75.0);
-/// The finest grid, in millimetres.
+/// The spacing of the finest grid, in millimetres.
 const FINE: f64 = 1.0 / TENTHS;
 
 /// The nearest point to `tip` that is within reach with the tool in this direction, and that the guard allows. `None` if
@@ -29,7 +31,7 @@ pub(super) fn nearest(tip: Vector, tool: Vector, guard: Option<&Guard>) -> Optio
     exact.and_then(|point| wish.best(around(point, FINE, 2))).or_else(|| wish.searched())
 }
 
-/// A position that cannot be, and what is allowed instead.
+/// The requested position, which the arm cannot or may not take, and what limits a point near it.
 struct Wish<'a> {
     tip: Vector,
     tool: Vector,
@@ -37,7 +39,7 @@ struct Wish<'a> {
 }
 
 impl Wish<'_> {
-    /// Is the point within reach, and outside every obstacle? For an arm that takes whole degrees, too.
+    /// Is the point within reach, and is the arm outside every obstacle there, also after rounding to whole degrees?
     fn is_allowed(&self, point: Vector) -> bool {
         let is_clear = |angles, guard: &Guard| {
             guard.is_clear(angles)
@@ -79,7 +81,7 @@ impl Wish<'_> {
     }
 }
 
-/// The grid round a point, in tenths of a millimetre: so many steps in each direction.
+/// The grid round `middle`, rounded to tenths of a millimetre: `steps` points to each side.
 fn around(middle: Vector, step: f64, steps: i32) -> impl Iterator<Item = Vector> {
     cube(steps).map(move |(x, y, z)| {
         let Vector { x, y, z } = middle + Vector::new(x.into(), y.into(), z.into()) * step;
@@ -151,7 +153,7 @@ mod tests {
 
     #[test]
     fn the_nearest_point_can_be_typed_as_it_is_printed() {
-        // The edge of what is within reach is so thin there that no point beside the exact one is in tenths.
+        // The reach has an edge there that is so thin that the exact point has no neighbour in tenths within reach.
         check_typed(Vector::new(256.467, 259.916, 337.429), Vector::new(-0.421_14, -0.766_053, -0.207_983));
         let mut random = 1_u32;
         let mut number = |range: f64| {

@@ -27,7 +27,7 @@ impl TipRefusal {
         }
     }
 
-    /// The reason alone, without the position and the nearest one.
+    /// The reason alone, without the requested position and the nearest point.
     #[must_use]
     pub fn reason(&self) -> String {
         match self {
@@ -51,7 +51,7 @@ impl std::error::Error for TipRefusal {}
 /// A position within reach that the guard does not allow.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GuardedTip {
-    /// What would be inside an obstacle.
+    /// The part of the arm that would be inside an obstacle, and how deep.
     pub breach: Breach,
     /// The requested tip, in millimetres.
     pub tip: Vector,
@@ -94,8 +94,8 @@ pub struct Unreachable {
     pub tip: Vector,
     /// The requested direction of the tool.
     pub tool: Vector,
-    /// The nearest point that the tip reaches with this direction of the tool, to a tenth of a millimetre; with a guard
-    /// the nearest one that it allows. `None` if there is none within reach or the numbers are no position.
+    /// The nearest point that the tip reaches with this direction of the tool and that the guard, if any, allows, to a tenth
+    /// of a millimetre. `None` if there is no such point, or if the request is no position.
     pub nearest: Option<Vector>,
     /// A usual direction of the tool with which the tip reaches the requested point; `None` if there is none.
     pub other_tool: Option<Vector>,
@@ -107,13 +107,13 @@ impl Unreachable {
         Self { why, tip, tool, nearest, other_tool }
     }
 
-    /// The distance from the requested point to the nearest point within reach, in millimetres.
+    /// The distance from the requested point to the nearest one, in millimetres; `None` if there is no nearest point.
     #[must_use]
     pub fn distance_mm(&self) -> Option<f64> {
         self.nearest.map(|nearest| (nearest - self.tip).length())
     }
 
-    /// The reason as text, with the parts that a user sees.
+    /// The reason as text, which names the parts of the arm that a user sees.
     #[must_use]
     pub const fn reason(&self) -> &'static str {
         match self.why {
@@ -151,7 +151,8 @@ impl fmt::Display for Unreachable {
 
 impl std::error::Error for Unreachable {}
 
-/// The first of the usual directions with which the tip may be at a point: down, outward, between them, up.
+/// The first of the usual directions with which the tip may be at a point: down, down and outward, outward, outward and up,
+/// up.
 fn other_tool(tip: Vector, guard: Option<&Guard>) -> Option<Vector> {
     let outward = Vector::new(tip.x, tip.y, 0.0).unit().unwrap_or(Vector::new(0.0, 1.0, 0.0));
     let [x, y] = [outward.x, outward.y].map(|component| (component * 100.0).round() / 100.0);

@@ -1,4 +1,4 @@
-//! Solves for the targets of a position of the tip, or says why there are none.
+//! Computes the targets for a position of the tip, or says why there are none.
 
 use kinematics::ik6;
 
@@ -17,10 +17,10 @@ impl TipTarget {
         Ok(Self::near(angles, tip, tool.unit().unwrap_or(tool), None))
     }
 
-    /// As [`TipTarget::of`], at a position that the guard allows; `None`: all are allowed.
+    /// As [`TipTarget::of`], but refuses a position that the guard does not allow; `None`: no guard.
     ///
     /// # Errors
-    /// The position is out of reach or not allowed: the reason, and the nearest point that is both.
+    /// The position is out of reach or not allowed: the reason, and the nearest point that is within reach and allowed.
     pub fn guarded(tip: Vector, tool: Vector, guard: Option<&Guard>) -> Result<Self, TipRefusal> {
         let unreachable = |why| TipRefusal::Unreachable(Unreachable::because(why, tip, tool, guard));
         let angles = ik6(tip, tool).map_err(unreachable)?;

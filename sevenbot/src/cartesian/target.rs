@@ -48,8 +48,8 @@ pub struct FineTipTarget {
 }
 
 impl TipTarget {
-    /// The whole degrees beside exact angles that the arm can take, with the smallest miss. Those that the guard allows go
-    /// first.
+    /// Rounds each exact angle down or up, so that the arm can take the whole degrees and the miss is the smallest. Those that
+    /// the guard allows are preferred.
     pub(super) fn near(angles: [f64; 5], tip: Vector, tool: Vector, guard: Option<&Guard>) -> Self {
         let candidates = || (0..32).map(|choice| Self::with(angles, beside(angles, choice), tip, tool));
         let legal = || candidates().filter(|target| check_arm(target.pose()).is_ok());

@@ -1,4 +1,5 @@
-//! Why a register does not hold what was written to it: from the table, the firmware, the status block, and a server between.
+//! Why a register does not hold what was written to it. The sources are the register table, the firmware, the status block,
+//! and a server between the program and the arm.
 
 use std::fmt;
 
@@ -47,7 +48,7 @@ pub enum MismatchCause {
     /// A target was against a limit that is switched on, so the arm ignored the whole frame
     /// ([D25](protocol_core::decisions#d25)).
     AgainstLimit {
-        /// The target, or the register of the limits if they were to be switched on.
+        /// The target, or the register of the limits if the frame was to switch a limit on.
         address: u8,
     },
     /// No joint angles reach the position that a write of map 2.1 asks for ([M7](protocol_core::decisions#m7)).
@@ -57,11 +58,11 @@ pub enum MismatchCause {
     /// The register holds the value, but its setting is not stored: the settings storage has a fault
     /// ([D19](protocol_core::decisions#d19)).
     NotStored,
-    /// The controller restarted since the write, and has its defaults.
+    /// The controller has restarted since the write, so its RAM registers hold their defaults.
     Restarted,
     /// The arm received the frame damaged.
     Damaged,
-    /// A server between did not pass the frame on.
+    /// A server between the program and the arm did not pass the frame on.
     NotPassedOn(ServerReason),
     /// The arm gives no reason: the frame was lost, or the register has changed since.
     Unknown,
@@ -82,12 +83,12 @@ pub enum ServerReason {
     ReadOnly,
     /// A stop of another program ended what this one sends.
     Stopped,
-    /// One program moves the arm at a time, and now another one does.
+    /// The server lets one program at a time move the arm, and another one moves it now.
     AnotherDrives,
 }
 
 impl ServerReason {
-    /// `None`: it passes writes on.
+    /// `None` if the server passes writes on.
     pub(super) fn of(state: &SharingState) -> Option<Self> {
         match () {
             () if state.is_read_only => Some(Self::ReadOnly),

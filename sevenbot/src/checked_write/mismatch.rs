@@ -43,10 +43,10 @@ pub struct WriteMismatch {
 pub struct NotTaken(pub(super) Vec<WriteMismatch>);
 
 impl NotTaken {
-    /// Fails if there is a register that differs.
+    /// Fails if there are registers in `differing`.
     ///
     /// # Errors
-    /// All these registers.
+    /// All registers of `differing`.
     pub fn check(differing: Vec<WriteMismatch>) -> Result<(), Self> {
         if differing.is_empty() { Ok(()) } else { Err(Self(differing)) }
     }
@@ -88,7 +88,8 @@ impl WriteError {
     }
 }
 
-/// What is wrong with a setting that is not stored. It may be stored if the storage is full.
+/// The text for [`MismatchCause::NotStored`]. It says "may", because a storage that becomes full also sets the fault bit,
+/// although it stored the setting.
 const NOT_STORED: &str = "may be lost when the arm is switched off";
 
 /// The number that a raw value encodes. Minus zero is zero (D9).
@@ -96,14 +97,14 @@ pub(super) fn number(address: u8, raw: u16) -> i32 {
     find_readable(address).map_or(i32::from(raw), |row| row.range.decode(raw))
 }
 
-/// The reasons, one for all neighbouring registers that share it, each on its own line.
+/// The reasons as text: one line for each run of neighbouring registers with the same cause.
 #[must_use]
 pub fn reasons(unchanged: &[WriteMismatch]) -> String {
     let groups = unchanged.chunk_by(|one, next| one.cause == next.cause);
     groups.map(reason).collect::<Vec<String>>().join("\n       ")
 }
 
-/// One reason for all registers that share it.
+/// The line for one run of registers with the same cause.
 fn reason(unchanged: &[WriteMismatch]) -> String {
     match unchanged {
         [only] => only.to_string(),

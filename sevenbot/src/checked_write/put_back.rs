@@ -5,15 +5,15 @@ use crate::arm::Arm;
 use crate::error::Error;
 use host_link::Snapshot;
 
-/// Each attempt is a write and a read. On a line that loses 3 % of its bytes about every second one succeeds.
+/// Each attempt is a write and a read. On a line that loses 3 % of its bytes, about every second attempt succeeds.
 const ATTEMPTS: u32 = 6;
 
 impl Arm {
-    /// Writes registers as they were before, and reads them back. Unlike [`Arm::write_checked`] it needs no long answer, and
-    /// writes again after an answer that is missing. On a silent line it takes six times the timeout of a reply.
+    /// Writes the values of `before`, and reads them back. Unlike [`Arm::write_checked`], it reads no other registers, and writes
+    /// again if an answer is missing. On a silent line it takes six times the timeout of a reply.
     ///
     /// # Errors
-    /// The registers hold other values, or no read was answered. Or the port failed.
+    /// The last attempt read other values or got no answer. Or the port failed.
     pub(crate) fn put_back(&mut self, before: &Snapshot) -> Result<(), WriteError> {
         self.with_attempts(1, |arm| {
             let mut done = Ok(());

@@ -10,7 +10,8 @@ use crate::arm::Arm;
 const SERVER: Option<Span> = Span::new(FIRST, 7);
 
 impl Arm {
-    /// The same registers. If a server between passes no writes on, that is the reason where the arm gives none.
+    /// The same registers. If the arm gives no cause and a server between does not pass writes on, the server's reason is the
+    /// cause.
     pub(crate) fn explained_by_server(&mut self, NotTaken(mut lost): NotTaken) -> NotTaken {
         let is_unknown = |register: &&mut WriteMismatch| register.cause == MismatchCause::Unknown;
         let mut unknown = lost.iter_mut().filter(is_unknown).peekable();
@@ -22,7 +23,7 @@ impl Arm {
         NotTaken(lost)
     }
 
-    /// `None` without a server, and from one that passes writes on.
+    /// `None` if there is no server, or if it passes writes on.
     fn server_reason(&mut self) -> Option<ServerReason> {
         if !self.identity().has_status_block() {
             return None;

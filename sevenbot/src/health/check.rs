@@ -2,11 +2,11 @@
 //!
 //! ```text
 //!   MoveCheck::begin ──▶ check, check, ... (waits for the answer)   ──▶ Ok, or MoveCheckError::Problems
-//!                    └─▶ poll, poll, ...   (never waits: a stream)  ──▶ the same
+//!                    └─▶ poll, poll, ...   (does not wait: a stream) ──▶ the same
 //! ```
 //!
-//! A driven joint that is blocked, let go or silent ends the move, and so do a lost supply and a restart of the controller. The
-//! firmware without status block tells nothing of this.
+//! A driven joint that is blocked, let go or silent ends the move, and so do a lost supply and a restart of the controller.
+//! Firmware without a status block reports none of these.
 
 use protocol_core::registers::map::{MISSING_SERVOS, MOVING_JOINTS};
 
@@ -30,7 +30,7 @@ pub enum MoveCheckError {
         /// The value of register 29.
         state: u8,
     },
-    /// Another program stopped the arm through the server that both use, or ended the stream of this one.
+    /// Another program stopped the arm through the server that both use, or ended this program's stream.
     #[error("{}", ServerReason::Stopped)]
     StoppedByAnother,
     /// An exchange with the arm failed.
@@ -75,7 +75,7 @@ impl MoveCheck {
     /// Begins to watch over these joints, as [`Joint::bit`](crate::Joint::bit)s.
     ///
     /// # Errors
-    /// [`MoveCheckError::Problems`] if a joint cannot be driven now; one that is blocked can, because its next target tries again.
+    /// [`MoveCheckError::Problems`] if a joint cannot be driven now. A blocked joint can: its next target tries again.
     /// [`MoveCheckError::NotDriven`] if the motors are off, and the errors of [`Arm::read`].
     pub fn begin(arm: &mut Arm, joints: u8) -> Result<Self, MoveCheckError> {
         let mut check = Self::idle(arm, joints);
@@ -83,14 +83,14 @@ impl MoveCheck {
         Ok(check)
     }
 
-    /// Begins to watch over the positions of all joints, for a measurement: the motors may be off. Asks nothing now.
+    /// Begins to watch over the positions of all joints, for a measurement: the motors may be off. Sends nothing yet.
     pub fn of_positions(arm: &mut Arm) -> Self {
         Self(Self::idle(arm, 0).0.of_positions())
     }
 
-    /// Begins to watch over these joints, and asks nothing now.
+    /// Begins to watch over these joints. Sends nothing yet.
     pub(crate) fn idle(arm: &mut Arm, joints: u8) -> Self {
-        // The answer to a question of the move before is no news.
+        // The answer to a question of the previous move would be out of date.
         arm.forget_background_question();
         Self(MoveWatch::new(arm.elapsed(), joints, arm.options().baud))
     }
@@ -125,7 +125,7 @@ impl MoveCheck {
         }))
     }
 
-    /// Looks at the answers that have arrived, and asks again when it is time. Never waits.
+    /// Checks the answer that has arrived, and asks again when it is time. Waits only after a fault, to read its cause.
     ///
     /// # Errors
     /// As [`Self::check`]. Also if the last questions, three or more in 1.5 s, were not answered.

@@ -14,7 +14,7 @@ use host_link::Snapshot;
 
 /// The claw. While the effector is a gripper, an obstacle is what it holds.
 pub(super) const CLAW: Option<Joint> = Joint::new(7);
-/// A joint at rest this near to its target is there: under a load a servo stops a few degrees short.
+/// A joint at rest within this distance of its target counts as there: under a load a servo stops a few degrees short.
 const AT_TARGET_DEGREES: f64 = 3.0;
 
 /// One joint at one instant. A value is `None` where the firmware does not tell it.
@@ -24,8 +24,8 @@ pub struct JointHealth {
     pub joint: Joint,
     /// The target.
     pub target: FineAngle,
-    /// The measured position, of a silent joint the last one; `None` if it was never measured. In whole degrees from
-    /// firmware without hundredths, where 0 may also mean that it was never measured.
+    /// The measured position; of a silent joint, the last one. `None` if the joint was never measured. Firmware without the
+    /// extended block gives whole degrees, and 0 for a joint that was never measured.
     pub position: Option<FineAngle>,
     /// The velocity in degrees per second, positive towards greater angles.
     pub velocity: Option<f64>,
@@ -35,8 +35,8 @@ pub struct JointHealth {
     pub is_moving: Option<bool>,
     /// Does the servo not answer?
     pub is_silent: Option<bool>,
-    /// Does an obstacle keep the joint from its target ([D27](protocol_core::decisions#d27))? Not of a gripper that
-    /// holds something.
+    /// Does an obstacle keep the joint from its target ([D27](protocol_core::decisions#d27))? Never true for a gripper,
+    /// which may hold something.
     pub is_blocked: Option<bool>,
     /// Does the gripper hold something? Something stopped it, and its load is at least half of the grip limit.
     pub is_gripping: Option<bool>,
@@ -89,8 +89,8 @@ impl JointHealth {
         rows.into_iter().filter(|(is_so, _)| *is_so == Some(true)).map(|(_, kind)| kind)
     }
 
-    /// What the joint does: its most important problem, or `moving`, `at its target`, `holds something`, `3.2° from its target`; empty if the motors
-    /// are off.
+    /// What the joint does: its most important problem, or `holds something`, `moving`, `at its target`, `not measured`,
+    /// `3.2° from its target`. Empty if there is no problem and the motors are off.
     #[must_use]
     pub fn word(&self, is_driven: bool) -> String {
         if let Some(problem) = self.problems().next() {

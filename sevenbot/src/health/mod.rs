@@ -5,7 +5,7 @@
 //!   the same during a move ──▶ MoveWatch, MoveCheck ──▶ the reason to end it
 //! ```
 //!
-//! Firmware without the blocks of this project does not tell everything: then a value is `None`, and never "healthy".
+//! A value that the firmware does not report is `None`. It never counts as healthy.
 
 mod check;
 mod joint;
@@ -67,18 +67,19 @@ pub struct Health {
     /// Did the controller switch the motors off because the servos lost their supply
     /// ([D29](protocol_core::decisions#d29))?
     pub is_supply_lost: Option<bool>,
-    /// Does a joint that pushes too hard give way, and a servo that let go engage anew
-    /// ([D27](protocol_core::decisions#d27), [D28](protocol_core::decisions#d28))?
+    /// Is the protection on? Then a joint that pushes too hard gives way, and a servo that let go engages anew
+    /// ([D27](protocol_core::decisions#d27), [D28](protocol_core::decisions#d28)).
     pub is_protected: Option<bool>,
-    /// The supply voltage of the servos.
+    /// The supply voltage of the servos; `None` also if no servo has reported it.
     pub supply_volts: Option<f64>,
-    /// The temperature of the hottest servo in degrees Celsius. No register tells which servo it is.
+    /// The temperature of the hottest servo in degrees Celsius; `None` also if no servo has reported it. No register tells
+    /// which servo it is.
     pub hottest_celsius: Option<u8>,
     flags: ProblemFlags,
 }
 
 impl Arm {
-    /// The health of the arm, from two reads. From the maker's firmware it is one read, and most of it is unknown.
+    /// The health of the arm, from two reads. With the maker's firmware there is one read, and most values are `None`.
     ///
     /// # Errors
     /// As [`Arm::read`].
@@ -87,7 +88,8 @@ impl Arm {
         Ok(Health::new(&self.with_blocks(&joints)?))
     }
 
-    /// Registers 0 to 255 with these values, and those of this project's blocks if the firmware has them. The others are 0.
+    /// Registers 0 to 255: the values of `joints`, and this project's blocks, read now, if the firmware has them. All others are
+    /// 0.
     ///
     /// # Errors
     /// As [`Arm::read`].
@@ -102,7 +104,7 @@ impl Arm {
 }
 
 impl Health {
-    /// From registers 0 to 255. Those of a block that the firmware does not have are 0.
+    /// From registers 0 to 255. Registers of a block that the firmware lacks are 0.
     #[must_use]
     pub fn new(registers: &Snapshot) -> Self {
         let has_status = registers.has_status_block();
@@ -127,8 +129,8 @@ impl Health {
         self.motor_state == motor_state::SERVO
     }
 
-    /// Of these joints, as [`Joint::bit`]s, those that are not at their targets: joint, position and target in degrees. A joint
-    /// that was not measured is left out, and so is a gripper that holds something.
+    /// The joints among `joints` ([`Joint::bit`]s) that are not at their targets, each with its position and target in degrees.
+    /// Joints that were not measured are left out, and so is a gripper that holds something.
     #[must_use]
     pub fn away_from_targets(&self, joints: u8) -> Vec<(Joint, u8, u8)> {
         let ours = self.joints.iter().filter(|joint| joints & joint.joint.bit() != 0);
@@ -146,7 +148,7 @@ impl Health {
         let explained = problems.iter().any(|problem| problem.kind != ProblemKind::Blocked);
         let faults = self.faults.unwrap_or(0);
         let faults = FAULT_BITS.into_iter().filter(|(bit, _)| faults & bit != 0);
-        // The bit of the servo bus is set for silent servos and alarms, which tell more.
+        // Silent servos and alarms also set the bit of the servo bus, and are problems of their own that say more.
         let told = faults.filter(|(bit, _)| *bit != fault::SERVO_BUS || !explained);
         problems.extend(told.map(|(_, kind)| Problem::of_arm(kind)));
         problems.sort_unstable();

@@ -1,4 +1,4 @@
-//! What can be wrong with an arm: the only table of the words for it, and of what to do.
+//! What can be wrong with an arm: the only table of the problems' texts and remedies.
 //!
 //! The tool, the Python package and the page show these texts. The page has a translation of each row.
 
@@ -31,7 +31,7 @@ pub enum ProblemKind {
     Overheat,
     /// A servo reports an error, and the firmware does not tell which.
     ServoBus,
-    /// The watchdog of the host acted ([D24](protocol_core::decisions#d24)).
+    /// The host-link watchdog acted ([D24](protocol_core::decisions#d24)).
     HostSilent,
     /// Settings cannot be stored, or could not be read ([D19](protocol_core::decisions#d19)).
     SettingsStorage,
@@ -50,7 +50,7 @@ struct ProblemTexts {
     kind: ProblemKind,
     /// For a table: a word or two.
     name: &'static str,
-    /// A sentence, without its end; of a joint's problem, what follows "joint 2 ".
+    /// A sentence without its full stop. For a joint's problem, the part after "joint 2 ".
     words: &'static str,
     /// What to do.
     remedy: &'static str,
@@ -209,7 +209,7 @@ impl ProblemKind {
         self.texts().map_or("", |texts| texts.name)
     }
 
-    /// What is wrong. Of a joint's problem, what follows "joint 2 ".
+    /// What is wrong. For a joint's problem, the part of the sentence after "joint 2 ".
     #[must_use]
     pub fn words(self) -> &'static str {
         self.texts().map_or("", |texts| texts.words)
@@ -221,7 +221,7 @@ impl ProblemKind {
         self.texts().map_or("", |texts| texts.remedy)
     }
 
-    /// Does the arm not carry out a move of the joint, or of all joints, while it has this problem?
+    /// Does this problem end moves: those of its joint, or all moves if it is a problem of the arm?
     #[must_use]
     pub const fn ends_moves(self) -> bool {
         matches!(
@@ -241,7 +241,7 @@ impl ProblemKind {
         matches!(self, Self::Restarted | Self::NoServoAnswers | Self::NoAnswer)
     }
 
-    /// Does a servo tell it, and may it have switched itself off?
+    /// Is it an alarm of a servo, which may have switched itself off?
     #[must_use]
     pub const fn is_alarm(self) -> bool {
         matches!(self, Self::Voltage | Self::Overload | Self::Overheat)

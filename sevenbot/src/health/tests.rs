@@ -89,7 +89,7 @@ fn the_makers_firmware_tells_positions_and_nothing_else() {
     set(&mut registers, MOTOR_STATE.address, &[motor_state::SERVO]);
     set(&mut registers, TARGET_POSITION.address, &[90; 7]);
     set(&mut registers, PRESENT_POSITION.address, &[91; 7]);
-    // Not of this project: an unknown firmware may show anything there.
+    // Other firmware may show anything there.
     set(&mut registers, BLOCKED_JOINTS.address, &[0x7F]);
     let health = Health::new(&registers);
     assert_eq!(health.problems(), []);

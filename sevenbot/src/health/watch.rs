@@ -6,7 +6,7 @@
 //! ```
 //!
 //! [`MoveCheck`](super::MoveCheck) is the shell for a blocking program. The page in a browser reads all registers in rounds, and
-//! passes them on. Times are those since any instant of one clock.
+//! passes them on. All times count from the same instant.
 
 use std::time::Duration;
 
@@ -25,7 +25,7 @@ pub(super) const REGISTERS: Span = Span::between(&SET_POINT_PERIOD, &SERVO_TEMPE
 pub(super) const STATE_REGISTERS: Span = Span::between(&MOTOR_STATE, &EFFECTOR_TYPE);
 /// The shortest time between two questions.
 const POLL_PERIOD: Duration = Duration::from_millis(100);
-/// The answers to these questions take at most this part of the line.
+/// The questions and their answers take at most one part in this many of the line's capacity.
 const SHARE_OF_LINE: u32 = 10;
 /// Bits of a question and its answer on the line: 7 bytes each around the values, ten bits a byte.
 const BITS_PER_CHECK: u32 = 10 * (7 + 7 + REGISTERS.count() as u32);
@@ -33,7 +33,7 @@ const BITS_PER_CHECK: u32 = 10 * (7 + 7 + REGISTERS.count() as u32);
 const BITS_OF_FRAME: u128 = 70;
 /// An arm that answers none of the last questions for this time is gone.
 pub(super) const SILENCE: Duration = Duration::from_millis(1_500);
-/// So many questions at least.
+/// The least number of unanswered questions before the arm is gone.
 const UNANSWERED_QUESTIONS: u32 = 3;
 /// A joint that was blocked before the move has this time to get free: a point of a stream clears the flag only then (D27).
 const TIME_TO_GET_FREE: Duration = Duration::from_secs(2);
@@ -50,7 +50,7 @@ pub enum MoveFault {
     },
     /// The arm has not answered for 1.5 s.
     Silent,
-    /// Another program stopped the arm through the server that both use, or ended the stream of this one.
+    /// Another program stopped the arm through the server that both use, or ended this program's stream.
     StoppedByAnother,
 }
 
@@ -75,18 +75,19 @@ pub struct MoveWatch {
     joints: u8,
     /// Do the motors have to drive the joints? If not, they have to be measured only.
     needs_motors: bool,
-    /// Blocked since before the move.
+    /// The joints that have been blocked since before the move.
     blocked_before: u8,
     /// Is the effector a gripper? Then an obstacle of joint 7 is what it holds.
     is_gripper: bool,
     begun: Duration,
     baud: u32,
-    /// The arm's counter of frames in the last answer that had it, and a time before that reading: an answer may be taken late.
+    /// The arm's counter of frames in the last answer that had it, and a time before the arm read it: this program may take an
+    /// answer late.
     accepted: Option<(Duration, u16)>,
-    /// The period that the arm has to have while a stream is open.
+    /// The set-point period that the arm must have while a stream is open.
     period_ms: Option<u16>,
     last_answer: Duration,
-    /// The time of the answer before the last one. The question for the last one was asked later.
+    /// The time of the second last answer. The question of the last answer was sent after it.
     answer_before: Duration,
     unanswered: u32,
     question_period: Duration,
@@ -125,7 +126,7 @@ impl MoveWatch {
         self
     }
 
-    /// For a recording of all joints: only what makes the positions wrong ends it, and the motors may be off.
+    /// For a recording of all joints: only a problem that hides positions ends it, and the motors may be off.
     #[must_use]
     pub const fn of_positions(mut self) -> Self {
         self.joints = ALL_JOINTS;
@@ -173,7 +174,7 @@ impl MoveWatch {
     /// Takes registers that came at `now`: motor state and effector, those from 184 to 255, or both.
     ///
     /// # Errors
-    /// They tell that the move has ended.
+    /// The registers show that the arm does not carry out the move.
     pub fn registers(&mut self, now: Duration, registers: &Snapshot) -> Result<(), MoveFault> {
         (self.answer_before, self.last_answer, self.unanswered) = (self.last_answer, now, 0);
         let has_state = registers.holds(STATE_REGISTERS);
@@ -208,8 +209,8 @@ impl MoveWatch {
         all.filter(|problem| self.needs_motors || problem.kind.hides_positions()).collect()
     }
 
-    /// Has the controller restarted since the last answer? Then its counter of frames begins again, and its stream is off.
-    /// Behind a server another program may have switched the stream off, so only the counter tells.
+    /// Has the controller restarted since the last answer? A restart resets the counter of frames, and switches the stream
+    /// off. Behind a server another program may switch the stream off, so only the counter shows a restart.
     fn has_restarted(&mut self, registers: &Snapshot) -> bool {
         if !registers.has_status_block() {
             return false;
@@ -228,7 +229,8 @@ impl MoveWatch {
         u32::try_from(bits / BITS_OF_FRAME).unwrap_or(u32::MAX)
     }
 
-    /// A stop switches the period off for a moment, before the server knows that it is one.
+    /// Did another program stop the arm through the server? A stop switches the set-point period off a moment before the
+    /// server reports the stop.
     fn is_stopped_by_another(&self, registers: &Snapshot) -> bool {
         SharingState::of(registers)
             .is_some_and(|server| server.is_stopped || self.has_other_period(registers))

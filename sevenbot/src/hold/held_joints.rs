@@ -29,7 +29,7 @@ pub struct HeldJoints {
 }
 
 impl HeldJoints {
-    /// What an arm with the extended block reads for the second argument of [`Self::new`].
+    /// The registers to read for the second argument of [`Self::new`] from an arm with the extended block.
     pub const FINE_REGISTERS: Span = Span::between(&FINE_TARGET, &LIMITS);
 
     /// From the joints, and on an arm with the extended block a read that holds [`Self::FINE_REGISTERS`].
@@ -38,7 +38,7 @@ impl HeldJoints {
         Self { fine, joints }
     }
 
-    /// From registers 0 to 255. Those of a block that the firmware does not have are 0.
+    /// From registers 0 to 255. Registers of a block that the firmware lacks are 0.
     #[must_use]
     pub fn of(registers: &Snapshot) -> Self {
         let status = registers.has_status_block().then(|| StatusBlock::from(registers.clone()));
@@ -105,13 +105,13 @@ impl HeldJoints {
         let present = joints.present(joint);
         let is_unknown = present == 0 && joints.is_missing(joint);
         // A joint that moves at position 0 cannot wait: it has just left 0 degrees, or start-up is not over. In
-        // start-up the arm does not drive a joint before it is measured, and the next read shows that.
+        // start-up the arm does not drive a joint before it is measured, and then the next read replaces this target.
         let can_wait = self.may_be_unmeasured(joint, is_past_start_up) && !joints.is_moving(joint);
         (!is_unknown && !can_wait).then_some(present.into())
     }
 
-    /// Has the joint reached its target? It keeps it ([D24](protocol_core::decisions#d24)): with its position as the new target, its
-    /// weight would draw it down by as much again.
+    /// Does the joint rest at its target? Then it keeps the target ([D24](protocol_core::decisions#d24)): with its position as
+    /// the new target, it would droop again, by as much.
     fn rests_at_target(&self, joint: Joint, measured: u16) -> bool {
         let is_silent = self.joints.status.is_none() || self.joints.is_missing(joint);
         !is_silent && !self.joints.is_moving(joint) && self.target(joint).abs_diff(measured) <= DROOP

@@ -6,9 +6,9 @@
 //! ```
 //!
 //! On an arm with the extended block, targets are the measured positions in hundredths of a degree, so that a stop moves no
-//! joint; a joint that has reached its target keeps it, so that an arm which is stopped again and again does not sink, and targets
-//! stay within the limits of register 188, because the arm takes no others ([D25](protocol_core::decisions#d25)). On other arms
-//! they are whole degrees. [`crate::joints`] interprets the registers of each joint.
+//! joint. A joint that has reached its target keeps it, so that repeated stops do not make the arm sink. Targets stay within
+//! the limits of register 188, because the arm takes no others ([D25](protocol_core::decisions#d25)). On other arms targets are
+//! whole degrees. [`crate::joints`] interprets the registers of each joint.
 //!
 //! [`Hold`] does no input or output. [`Arm::hold`] is the shell for a blocking program; the page in a browser has another.
 
@@ -87,7 +87,7 @@ impl Arm {
     }
 
     fn held_joints(&mut self, is_fine: bool) -> Result<HeldJoints, Error> {
-        // The status first: a restart after it is noticed.
+        // Read the status first: then the next status shows a restart during these reads.
         let joints = self.joints()?;
         let fine = is_fine.then(|| self.read_span(HeldJoints::FINE_REGISTERS)).transpose()?;
         Ok(HeldJoints::new(joints, fine))
@@ -96,7 +96,7 @@ impl Arm {
 
 type Frames = Vec<(u8, Vec<u8>)>;
 
-/// A stop in progress. Times are those since any instant of one clock.
+/// A stop in progress. All times count from the same instant.
 ///
 /// ```
 /// use sevenbot::hold::{Hold, HoldStep};
@@ -119,7 +119,7 @@ pub struct Hold {
     start: Option<Duration>,
     /// The speeds to restore; `None` if the stop does not slow the joints down, or has restored them.
     speeds: Option<[u8; 7]>,
-    /// Were the speeds written?
+    /// Were the restored speeds written at least once?
     is_restoring: bool,
     stage: Stage,
     /// A read shows the effect of the frames only if it was sent at this time or later.
@@ -138,7 +138,7 @@ enum Stage {
     Waiting(Duration),
     /// These frames are to be written.
     Writing(Frames),
-    /// They were written, and the joints are to be read.
+    /// These frames were written, and the joints are to be read.
     Verifying(Frames),
     Ended(HoldStep),
 }
@@ -195,7 +195,7 @@ impl Hold {
             frames.push((SET_POINT_PERIOD.address, vec![0, 0]));
         }
         frames.push((SPEED.address, BRAKE.to_vec()));
-        // Where the joints are by now is not known: these targets are replaced after the first read.
+        // The joints may have moved on since: the first read replaces these targets.
         frames.extend(
             known.into_iter().flat_map(|known| known.frames(&known.targets_to_write(&[None; 7], false))),
         );
@@ -221,8 +221,8 @@ impl Hold {
         }
     }
 
-    /// Takes the joints as they came at `now`, from reads that were sent at `asked` or later. Joints that were read before the
-    /// last frames had their turn are passed over.
+    /// Takes the joints that arrived at `now`, from reads that were sent at `asked` or later. Ignores joints from reads that
+    /// were sent before the last frames.
     pub fn joints(&mut self, asked: Duration, now: Duration, joints: &HeldJoints) {
         if asked < self.written || matches!(self.stage, Stage::Ended(_) | Stage::Writing(_)) {
             return;
@@ -236,12 +236,12 @@ impl Hold {
         };
     }
 
-    /// The next step, given the joints as they are now. `is_past_start_up`: 0.7 s have passed since the first step, after
+    /// The next step, given the joints as they are now. `is_past_start_up`: 0.7 s have passed since the first read, after
     /// which each joint is measured or missing.
     fn step(&mut self, now: &HeldJoints, is_past_start_up: bool) -> HoldStep {
         if self.before.as_ref().is_some_and(|before| now.joints.has_restarted_since(before)) {
-            // What was sent is lost. The arm holds by itself, and measures its joints anew (D12). A frame that slows the joints
-            // down may have come after the restart.
+            // The restart discarded the targets. The arm holds by itself, and measures its joints anew (D12). The frame that
+            // slows the joints down may have arrived after the restart, so the default speeds are restored.
             let speeds = self.speeds.map(|_| SPEED.default_bytes());
             *self = Self { has_restarted: true, speeds, ..Self::default() };
         }
@@ -269,7 +269,7 @@ impl Hold {
         self.restore_speeds(now).unwrap_or_else(|| HoldStep::Holds(now.joints.clone()))
     }
 
-    /// What restores the speeds; `None` if that is not needed.
+    /// The step that restores the speeds; `None` if that is not needed.
     fn restore_speeds(&mut self, now: &HeldJoints) -> Option<HoldStep> {
         let wanted = self.speeds?;
         let found = Joint::ALL.map(|joint| now.joints.speed(joint).steps());

@@ -1,4 +1,4 @@
-//! An arm of plain registers takes or loses the frames of a stop, and its replies come or are lost.
+//! Stops of an arm that is made of plain registers. Frames and replies may be lost.
 
 use super::*;
 use host_link::Snapshot;
@@ -10,7 +10,7 @@ const fn ms(milliseconds: u64) -> Duration {
     Duration::from_millis(milliseconds)
 }
 
-/// Its joint 1 goes from 50 to 150 degrees at its speed, unless it is sent elsewhere.
+/// The registers of an arm whose joint 1 goes from 50 to 150 degrees at its speed, unless it gets another target.
 struct PlainArm(Snapshot);
 
 impl PlainArm {
@@ -46,7 +46,7 @@ impl PlainArm {
         self.0.joints(&SPEED)
     }
 
-    /// Lets time pass: a step of the speed is 1.9 degrees per second.
+    /// Moves joint 1 for this time. One step of its speed is 1.9 degrees/s.
     fn pass(&mut self, time: Duration) {
         let step =
             u16::try_from(190 * time.as_millis() / 1_000).expect("short") * u16::from(self.speeds()[0]);
@@ -70,7 +70,7 @@ impl PlainArm {
     }
 }
 
-/// Carries out a stop of an arm. `comes` tells for each frame and each reply whether it comes.
+/// Carries out a stop of an arm. `comes` tells for each frame and each reply whether it arrives.
 fn stop(
     hold: &mut Hold,
     arm: &mut PlainArm,

@@ -24,7 +24,7 @@ const ARRIVAL_TIMEOUT: Duration = Duration::from_secs(100);
 const SETTLE_TIMEOUT: Duration = Duration::from_secs(2);
 
 impl Arm {
-    /// Where the arm stands, as exact as it tells.
+    /// Where the arm stands: in hundredths of a degree with the extended block, otherwise in whole degrees.
     ///
     /// # Errors
     /// As [`Arm::read`].
@@ -39,7 +39,7 @@ impl Arm {
 }
 
 impl SetPointStream<'_> {
-    /// Streams the way to a first point, if there is one. Afterwards the next point is due.
+    /// Streams the way to a first point, if it has a length. Afterwards the next point is due.
     ///
     /// # Errors
     /// The observer ended it, the port failed, or the arm does not follow: [`SetPointStream::check`]. The joints then stop at
@@ -55,8 +55,8 @@ impl SetPointStream<'_> {
     /// Waits until the joints of the stream stand at their last points. `wait` waits until a time of [`Arm::elapsed`].
     ///
     /// # Errors
-    /// A joint does not get there: [`MoveError::NotReached`], or the reasons of [`SetPointStream::check`]. Those of `wait`, or
-    /// an exchange failed.
+    /// A joint does not arrive: [`MoveError::NotReached`], or the errors of [`SetPointStream::check`]. Also the errors of `wait`,
+    /// and failed exchanges.
     pub fn wait_until_arrived<E: From<MoveError>>(
         &mut self,
         mut wait: impl FnMut(&mut Self, Duration) -> Result<(), E>,
@@ -66,7 +66,7 @@ impl SetPointStream<'_> {
         let mut next = self.arm().elapsed() + 2 * self.period();
         loop {
             wait(self, next)?;
-            // Each read is a sign of life.
+            // Each read also keeps the watchdog of the arm from acting.
             let state = self.check_now().map_err(MoveError::from)?;
             let now = self.arm().elapsed();
             if now >= deadline || state.moving.is_none_or(|moving| moving & !state.missing == 0) {

@@ -10,7 +10,7 @@ use crate::arm::Arm;
 use crate::movement_run::{MovementRun, RunStep};
 use crate::stream::SetPointStream;
 
-/// The longest time between two questions to the observer.
+/// The longest time between two calls of the observer.
 pub(super) const POLL_PERIOD: Duration = Duration::from_millis(20);
 
 /// Where the steps of a run go.
@@ -18,7 +18,7 @@ pub(super) trait StepSink {
     /// The arm of the run.
     fn arm(&mut self) -> &mut Arm;
 
-    /// Sends a point or a frame, and looks whether the arm follows.
+    /// Sends a point or a frame. A stream also checks whether the arm follows.
     fn carry_out(&mut self, step: &RunStep) -> Result<(), MoveError>;
 }
 

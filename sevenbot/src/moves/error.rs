@@ -1,4 +1,4 @@
-//! Why a move does not start or end.
+//! Why a move does not start, or does not reach its end.
 
 use std::time::Duration;
 
@@ -12,17 +12,17 @@ use crate::register_text::{joints, motor_state_name};
 use crate::stream::StreamError;
 use protocol_core::registers::Joint;
 
-/// Why a move does not start or end.
+/// Why a move does not start, or does not reach its end.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MoveError {
-    /// [`Observer::goes_on`](super::Observer::goes_on) said no. A player has made the arm hold; after another call it may
-    /// still be moving.
+    /// [`Observer::goes_on`](super::Observer::goes_on) returned `false`. A player has made the arm hold. After another call the
+    /// arm may still be moving.
     #[error("interrupted")]
     Interrupted,
-    /// This program did not run for so long that the movement is over: the arm has stopped.
+    /// This program was suspended for so long that the movement ended. The arm has stopped.
     #[error("this program paused for {:.1} s, so the movement ended: the arm has stopped on its way", time.as_secs_f64())]
     Paused {
-        /// The time.
+        /// How late the program was.
         time: Duration,
     },
     /// The motors do not drive the joints.
@@ -39,7 +39,7 @@ pub enum MoveError {
     /// The arm did not take these values.
     #[error(transparent)]
     NotTaken(#[from] NotTaken),
-    /// It is unknown whether the arm took the values, so it may be moving, for this reason.
+    /// The arm may be moving, because it is unknown whether it took the values. Holds the reason.
     #[error("the arm may still be moving: {0}")]
     MayMove(#[source] WriteError),
     /// The set-points of these joints still move.
@@ -75,7 +75,7 @@ pub enum MoveError {
         /// Joint, position and target in degrees.
         away: Vec<(Joint, u8, u8)>,
     },
-    /// Another program stopped the arm through the server that both use, or ended the stream of this one.
+    /// Another program stopped the arm through the server that both use, or ended this program's stream.
     #[error("{}", ServerReason::Stopped)]
     StoppedByAnother,
     /// The arm answers, but its reports have ended.
@@ -147,7 +147,7 @@ impl Arm {
 
 /// A failure that may be the end of the connection.
 pub trait ConnectionLost {
-    /// Can the arm take no more commands?
+    /// May the connection be lost, so that the arm takes no more commands?
     fn is_connection_lost(&self) -> bool;
 }
 

@@ -18,13 +18,14 @@ use crate::joints::{JointSnapshot, bits};
 
 /// The arm notices a servo that let go after at most 200 ms (D28), and a silent one sooner.
 const WATCH_TIME: Duration = Duration::from_millis(500);
-/// A joint that gives way is blocked after a second (D27).
+/// The targets may change for this time. A joint that gives way is reported as blocked after a second (D27).
 const LONGEST_WATCH: Duration = Duration::from_millis(2_000);
 const POLL_PERIOD: Duration = Duration::from_millis(50);
-/// The target that a joint gives itself is at most this far from where it is: the distance at which its servo pushes with its limit.
+/// A target that the arm itself gives a joint is at most this far from the joint. At this distance the servo pushes with the
+/// default limit (D27).
 const OWN_TARGET_DEGREES: u8 = 4;
-/// A joint that is further from its target, and goes away from it, does not hold. A loaded joint droops by up to 1.5 degrees, and one
-/// that was stopped at speed comes back to its target.
+/// A joint that is further than this from its target, and further than at the start, does not hold. A loaded joint droops by
+/// up to 1.5 degrees, and one that was stopped at speed comes back to its target.
 const HELD_DEGREES: u8 = 10;
 
 impl Arm {
@@ -48,8 +49,8 @@ impl Arm {
     /// ```
     ///
     /// # Errors
-    /// [`MoveError::MayMove`] if the arm did not take the targets that hold it, or does not answer any more. Those of
-    /// [`Arm::watch_hold`], also if the controller restarted: it then holds the arm.
+    /// [`MoveError::MayMove`] if the arm did not take the targets that hold it, or does not answer any more. The errors of
+    /// [`Arm::watch_hold`]. [`MoveError::Problems`] if the controller restarted, which then holds the arm.
     pub fn hold_and_watch(&mut self) -> Result<JointSnapshot, MoveError> {
         let (joints, has_restarted) = self.hold_through_restarts()?;
         if joints.is_driven() {
@@ -78,18 +79,18 @@ impl Arm {
         self.watch_hold()
     }
 
-    /// Fails if no servo answers. In motor state 1 the motors would go on as soon as somebody switches their supply on.
+    /// Fails if no servo answers. In motor state 1 the motors would start as soon as their supply is switched on.
     pub(super) fn some_servo_answers(&mut self) -> Result<(), MoveError> {
         self.has_none(|kind| kind == ProblemKind::NoServoAnswers)
     }
 
-    /// Watches for half a second whether all joints hold their targets. A joint that engages, or gives way, takes where it is as its
-    /// target: then it is watched for half a second more, until it stays or the arm tells what is in its way.
+    /// Watches for half a second whether all joints hold their targets. A joint that engages or gives way gets its own position
+    /// as its target. Then the watch goes on for another half second, until the joint stays or the arm reports a problem.
     ///
     /// # Errors
-    /// The motors do not drive the joints, a joint is silent, blocked or let go, a servo has an alarm, the supply was lost, the controller restarted,
-    /// another program wrote a target, or an exchange failed. [`MoveError::NotHeld`] if a joint is further than 10 degrees from its
-    /// target at the end, and further than at the start.
+    /// The motors do not drive the joints, a joint is silent, blocked or let go, a servo has an alarm, the supply was lost, the
+    /// controller restarted, another program wrote a target, or an exchange failed. [`MoveError::NotHeld`] if a joint is further
+    /// than 10 degrees from its target at the end, and further than at the start.
     pub fn watch_hold(&mut self) -> Result<(), MoveError> {
         let mut check = MoveCheck::begin(self, bits(Joint::ALL))?;
         let mut begun = self.joints()?;
@@ -97,7 +98,7 @@ impl Arm {
         let longest = self.now() + LONGEST_WATCH;
         loop {
             let joints = self.joints()?;
-            // After the joints: a restart, too, gives the arm other targets.
+            // Check after the read of the joints: a restart changes targets, too, and this names it.
             check.check(self)?;
             if joints.targets() != begun.targets() {
                 if self.now() >= longest || !are_own_targets(&begun, &joints) {
@@ -126,7 +127,7 @@ impl Arm {
     }
 }
 
-/// Are the targets that changed where their joints are?
+/// Is each changed target near its joint? Then the arm changed it, not another program.
 fn are_own_targets(before: &JointSnapshot, now: &JointSnapshot) -> bool {
     let mut changed = Joint::ALL.into_iter().filter(|joint| now.target(*joint) != before.target(*joint));
     changed.all(|joint| now.present(joint).abs_diff(now.target(joint)) <= OWN_TARGET_DEGREES)

@@ -44,7 +44,8 @@ impl Arm {
     /// [`Arm::end_abandoned_stream`].
     ///
     /// # Errors
-    /// [`MoveError::NotDriven`] if the motors do not drive the joints, [`MoveError::Problems`] if that follows from a lost supply, and the errors of [`Arm::read`].
+    /// [`MoveError::NotDriven`] if the motors do not drive the joints, [`MoveError::Problems`] if a lost supply is the reason,
+    /// and the errors of [`Arm::read`].
     pub fn driven_joints(&mut self) -> Result<JointSnapshot, MoveError> {
         let joints = self.wait_until_settled()?;
         if joints.is_driven() {
@@ -76,8 +77,8 @@ impl Arm {
 pub struct JointMove {
     targets: Targets,
     is_rounded: bool,
-    /// A joint this near to its target, in whole degrees, needs no more time to settle. 0 for targets in hundredths: rounded
-    /// as they are, one degree could be nearly two.
+    /// A joint this near to its target, in whole degrees, needs no more time to settle. 0 for targets in hundredths: one degree
+    /// between rounded angles can be nearly two degrees.
     arrived: u8,
     /// Speeds, durations and positions before the move.
     plan: Snapshot,
@@ -127,7 +128,8 @@ impl JointMove {
         MoveCheck::begin(arm, joints_of(&targets))?;
         let before = PaceBefore::read(arm, &targets)?;
         let begun = pace.set(arm, &targets).and_then(|()| Self::begin_fine(arm, targets));
-        // If this fails too, it is for the same reason. After a bad exchange the arm may have taken the targets.
+        // A second failure has the same reason, so it is ignored. After a failed exchange the arm may have taken the
+        // targets, so `put_back` leaves the pace of moving joints alone.
         let _ = match &begun {
             Ok(_) => Ok(()),
             Err(error) if error.is_connection_lost() => before.put_back(arm),

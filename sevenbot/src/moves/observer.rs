@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use crate::arm::Arm;
 
-/// What a call does at the moment, and in what its progress is counted.
+/// What a call does at the moment, and the unit of its progress.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
     /// Joints move to their targets. In degrees, summed over all joints.
@@ -53,7 +53,7 @@ pub trait Observer {
         let _ = (stage, done, total);
     }
 
-    /// Waits between two reads of an arm that moves. It may use the arm meanwhile for short reads.
+    /// Waits between two reads of an arm that moves. An implementation may use the arm for short reads meanwhile.
     fn pause(&mut self, arm: &mut Arm, time: Duration) {
         arm.sleep(time);
     }

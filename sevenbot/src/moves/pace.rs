@@ -19,12 +19,12 @@ const LONGEST_MOVE: Duration = Duration::from_secs(100);
 /// Attempts of a read: on a line that loses 3 % of its bytes, about two of three succeed.
 const ATTEMPTS: u32 = 5;
 
-/// How fast a move is: a speed, a duration, or what the arm has.
+/// The pace of a move: a speed or a duration. The default keeps the registers of the arm.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Pace {
-    /// The speed of the joints.
+    /// The speed of the joints; `None`: the maximum with a `time`, otherwise unchanged.
     pub speed: Option<Speed>,
-    /// The duration of the move. A duration applies at the maximum speed, so this sets the speed, too (D11).
+    /// The duration of the move; `None`: unchanged. It applies only at the maximum speed (D11).
     pub time: Option<MoveTime>,
 }
 
@@ -55,7 +55,7 @@ pub struct PaceBefore {
 }
 
 impl PaceBefore {
-    /// Reads them before a move to these targets.
+    /// Reads the speeds and durations before a move to these targets.
     ///
     /// # Errors
     /// As [`Arm::read`].
@@ -64,8 +64,8 @@ impl PaceBefore {
         Ok(Self { registers, joints: joints_of(targets) })
     }
 
-    /// The joints of the move whose set-point still moves, as [`Joint::bit`](crate::Joint::bit)s. None from firmware that does
-    /// not tell it, and no joint that is blocked or silent.
+    /// The joints of the move whose set-point still moves, as [`Joint::bit`](crate::Joint::bit)s. Blocked and silent joints do
+    /// not count. 0 from firmware that does not tell.
     ///
     /// # Errors
     /// As [`Arm::read`].
@@ -74,14 +74,14 @@ impl PaceBefore {
             return Ok(0);
         }
         arm.with_attempts(ATTEMPTS, |arm| {
-            // A bad line loses a long answer, so these are two.
+            // A bad line loses long answers more often, so these are two short reads.
             let blocked = arm.read_span(Span::of(&BLOCKED_JOINTS))?.byte(&BLOCKED_JOINTS);
             let now = arm.read_span(Span::between(&MISSING_SERVOS, &MOVING_JOINTS))?;
             Ok(self.joints & now.byte(&MOVING_JOINTS) & !now.byte(&MISSING_SERVOS) & !blocked)
         })
     }
 
-    /// Waits until none of the joints moves: if a move fails at one joint, the others go on.
+    /// Waits until no joint of the move moves. After a move failed at one joint, the others go on.
     ///
     /// # Errors
     /// The observer ended the wait, a joint still moves after 100 s, or an exchange failed.
@@ -102,11 +102,11 @@ impl PaceBefore {
         }
     }
 
-    /// Puts them back, with several attempts on a bad line.
+    /// Restores the speeds and durations, with several attempts on a bad line.
     ///
     /// # Errors
     /// [`MoveError::StillMoving`] if a joint of the move moves: another speed would act at once (D11), so nothing is written.
-    /// The registers have other values, or an exchange failed.
+    /// Also fails if the registers do not take the values, or an exchange failed.
     pub fn put_back(&self, arm: &mut Arm) -> Result<(), MoveError> {
         match self.moving(arm)? {
             0 => self.put_back_at_once(arm),

@@ -4,8 +4,8 @@
 //!   forearm away from its limit ──▶ rear arm upright ──▶ park pose ──▶ damping ──▶ watched: does a joint sink?
 //! ```
 //!
-//! The motors go to damping (state 0), not to forceless (state 2): if a joint is loaded after all, it sinks slowly, is noticed, and
-//! is driven again.
+//! The motors go to damping (state 0), not to forceless (state 2). So a joint that carries weight after all sinks slowly, and is
+//! driven again as soon as the watch sees it.
 
 use std::time::Duration;
 
@@ -30,11 +30,11 @@ pub const PARK_POSE: [Option<u8>; 7] = [None, Some(90), Some(0), Some(90), Some(
 
 /// The forearm beyond this angle comes down before the rear arm goes up: the linkage ends at 161 degrees.
 const FOREARM_LIMIT_DEGREES: u8 = 120;
-/// 19 degrees/s.
+/// The speed of the way to the pose: 19 degrees/s.
 const SPEED_STEPS: u8 = 10;
 /// The arm is watched for this time after it was let go.
 const WATCH_TIME: Duration = Duration::from_secs(2);
-/// The same in a pose of the user, which may be one that a damped joint leaves by a degree in 15 s, and by a hundred in a minute.
+/// The same for a pose of the user. From some poses a damped joint creeps by a degree in 15 s, and by a hundred in a minute.
 const WATCH_TIME_OF_OWN_POSE: Duration = Duration::from_secs(15);
 /// Joints that were let go have settled after this time.
 const SETTLING_TIME: Duration = Duration::from_secs(5);
@@ -69,9 +69,9 @@ impl From<crate::error::Error> for ParkError {
 }
 
 impl Arm {
-    /// Moves slowly to a pose in which the arm may be let go, lets it go (motor state 0), and checks that it stays: for 2 seconds in
-    /// [`PARK_POSE`] (`None`), which is right for an arm with an empty gripper, and for 15 seconds in another pose. Speeds and
-    /// times are those of before at the end.
+    /// Moves slowly to a pose in which the arm may be let go, lets it go (motor state 0), and checks that it stays: for 2 s in
+    /// [`PARK_POSE`] (`None`), which is right for an arm with an empty gripper, and for 15 s in another pose. Restores the
+    /// speeds and durations before it lets go.
     ///
     /// # Errors
     /// The arm does not reach the pose. Or a joint moves by more than 2 degrees when it is let go, or still moves after 5 seconds,
@@ -95,7 +95,7 @@ impl Arm {
         pose: Option<FineTargets>,
         observer: &mut dyn Observer,
     ) -> Result<(), MoveError> {
-        // Between two moves: a controller that restarted has other speeds.
+        // Checks between two moves: after a restart of the controller the slow speed is lost.
         let mut check = MoveCheck::begin(self, 0)?;
         let slowly = Pace { speed: Speed::from_steps(SPEED_STEPS), time: None };
         for targets in park_way(pose, self.park_positions()?) {
@@ -126,7 +126,7 @@ impl Arm {
         is_own_pose: bool,
         observer: &mut dyn Observer,
     ) -> Result<[FineAngle; 7], ParkError> {
-        // One in whole degrees may change by its last digit.
+        // A position in whole degrees may change by one without a real movement.
         let creeps = if self.has_extended_block()? { CREEPS_HUNDREDTHS } else { STAYS_HUNDREDTHS };
         let begin = self.now();
         let end = begin + if is_own_pose { WATCH_TIME_OF_OWN_POSE } else { WATCH_TIME };
@@ -150,7 +150,7 @@ impl Arm {
         }
     }
 
-    /// The measured positions, as exact as the arm has them.
+    /// The measured positions: in hundredths of a degree if the arm has them.
     fn park_positions(&mut self) -> Result<[FineAngle; 7], crate::error::Error> {
         let whole = self.read_span(Span::of(&PRESENT_POSITION))?.joints(&PRESENT_POSITION);
         let mut positions = whole.map(|degrees| FineAngle::from(crate::units::Angle::from_register(degrees)));

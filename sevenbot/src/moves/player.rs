@@ -86,7 +86,7 @@ impl Player {
         }
     }
 
-    /// With another rule for the way to the first pose. Without it a pose further than 5 degrees is refused.
+    /// With another rule for the way to the first pose. The default refuses a pose that is further than 5 degrees away.
     #[must_use]
     pub fn with_approach(self, rule: ApproachRule) -> Self {
         Self { rule, ..self }
@@ -98,7 +98,7 @@ impl Player {
         self.played
     }
 
-    /// Could the speeds and durations not be put back, because the connection was lost? Then they are those of the recording.
+    /// Could the speeds and durations not be restored, as on a lost connection? Then the arm keeps those of the recording.
     #[must_use]
     pub const fn has_left_pace(&self) -> bool {
         self.has_left_pace
@@ -114,7 +114,7 @@ impl Player {
     /// that the arm had before. The motors must drive the joints: [`Arm::driven_joints`].
     ///
     /// # Errors
-    /// The first pose is too far from where the arm stands or, played more than once, from the last pose: then nothing is
+    /// The first pose is too far from where the arm stands or, if `times` is not 1, from the last pose: then nothing is
     /// moved. A joint is blocked, let go or silent, the supply was lost, or the controller restarted:
     /// [`MoveError::Problems`]. The observer ended it, the arm did not take a value or reach a pose, its reports ended, or an
     /// exchange failed.
@@ -130,7 +130,7 @@ impl Player {
             }
             done
         });
-        // The speeds come first: if the line is too bad for the rest, the next program does that.
+        // Restore the speeds first. If the line is too bad for the rest, the next program ends the stream.
         let restored = before.put_back_at_once(arm);
         self.has_left_pace = restored.is_err();
         if restored.is_ok() && done.as_ref().is_err_and(MoveError::is_connection_lost) {
@@ -145,7 +145,7 @@ impl Player {
         times: u32,
         observer: &mut dyn Observer,
     ) -> Result<(), MoveError> {
-        // Between the moves, each of which has a check of its own.
+        // Checks between the moves. Each move has a check of its own.
         let mut check = MoveCheck::begin(arm, 0)?;
         while times == 0 || self.played < times {
             self.approach(arm, observer)?;
@@ -213,10 +213,11 @@ impl Player {
         self.moments.last().map_or(Ok(()), |last| move_to(arm, last.pose, observer))
     }
 
-    /// Streams all points once, from where the arm is: at the first of them.
+    /// Streams all points once. The arm stands at the first one.
     fn stream(&self, tape: &mut Tape, arm: &mut Arm, observer: &mut dyn Observer) -> Result<(), MoveError> {
         let options = StreamOptions::new(PERIOD_MS).ok_or(StreamError::NoExtendedBlock)?;
-        // The points tell the speed. The recording was checked, and the arm is at its first pose.
+        // The points set the speed, so the registers must not limit it. The recording was checked, and the arm is at its
+        // first pose.
         arm.write_checked(SPEED.address, &[Speed::MAXIMUM.steps(); 7])?;
         let mut stream = SetPointStream::open(arm, options)?;
         let vacuum = self.moments.first().map(|first| first.vacuum);
@@ -228,8 +229,8 @@ impl Player {
         self.end_stream(stream, done)
     }
 
-    /// Puts the speeds and then the registers of a stream back. If the connection is too bad for that, the stream is left to the
-    /// watchdog of the arm, so that the next program knows of it: [`Arm::end_abandoned_stream`].
+    /// Restores the speeds, and then the registers of the stream. If the connection is lost, leaves the stream to the watchdog of
+    /// the arm, so that the next program recognizes it: [`Arm::end_abandoned_stream`].
     fn end_stream(
         &self,
         mut stream: SetPointStream<'_>,

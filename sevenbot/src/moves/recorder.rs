@@ -25,7 +25,7 @@ pub struct RecordedPose {
     pub pose: [FineAngle; 7],
 }
 
-/// Makes poses of the reports of an arm.
+/// Turns the reports of an arm into poses.
 ///
 /// ```
 /// use sevenbot::moves::{MoveError, Recorder};
@@ -52,8 +52,8 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// For the reports of [`Arm::with_reports`] with the same arguments. Drops those that were received before: they may be of an
-    /// earlier move.
+    /// For the reports of [`Arm::with_reports`] with the same arguments. Drops reports that were received before, because they
+    /// may be of an earlier move.
     #[must_use]
     pub fn new(arm: &mut Arm, hz: u8, content: u8) -> Self {
         arm.reports().for_each(drop);

@@ -1,4 +1,4 @@
-//! Writes of any registers that may move the arm: refused or watched like the moves that they are.
+//! Writes of any registers. A write that moves the arm is refused and checked as a move is.
 
 use protocol_core::registers::Joint;
 use protocol_core::registers::map::{FINE_TARGET, MOTOR_STATE, TARGET_POSITION, motor_state};
@@ -17,9 +17,9 @@ impl Arm {
     /// As [`Arm::write_checked`], for registers that a user names. `unlocks` opens the EEPROM lock for this write.
     ///
     /// - A target of a joint that is driven is a move: it is not written while the joint is silent or has let go, and the arm is
-    ///   asked afterwards. A whole position of the wrist sets the targets of joints 1 to 3
+    ///   checked after the write. A whole position of the wrist sets the targets of joints 1 to 3
     ///   ([M7](protocol_core::decisions#m7)).
-    /// - Motor state 1 is not written while no servo answers. Alone it is [`Arm::engage_and_watch`].
+    /// - Motor state 1 is not written while no servo answers. A write of it alone is [`Arm::engage_and_watch`].
     ///
     /// ```
     /// use sevenbot::moves::MoveError;

@@ -1,7 +1,8 @@
-//! The time at which the arm measured a report, from the time at which it arrived.
+//! Computes when the arm measured a report from when the report arrived.
 //!
 //! The arm reports without drift (D14), but USB adapters and a busy host deliver late, and several reports at once. So
-//! a report belongs to the next tick of the arm's clock. Only a longer delay means that reports were lost.
+//! a report gets the tick after that of the last report. It gets a later tick only if that one is nearer to its arrival:
+//! then reports were lost.
 
 use std::time::{Duration, Instant};
 

@@ -7,11 +7,12 @@ use crate::arm::Arm;
 use crate::error::Error;
 use host_link::Span;
 
-/// On a line that loses 3 % of its bytes, one of these arrives 99 times of 100.
+/// How often a write is sent that cannot be confirmed. On a line that loses 3 % of its bytes, at least one of these arrives
+/// 99 times of 100.
 const BLIND_WRITES: usize = 3;
 
 impl Arm {
-    /// The most exact positions that this arm reports: a value of register 189.
+    /// The value of register 189 for the most exact positions that this arm reports.
     ///
     /// # Errors
     /// As [`Arm::read`].
@@ -20,7 +21,7 @@ impl Arm {
         Ok(if has_block { report_content::FINE_POSITIONS } else { report_content::POSITIONS })
     }
 
-    /// Runs `work` while the arm reports `hz` times a second what `content` asks for: a value of register 189.
+    /// Runs `work` while the arm sends `hz` reports a second. `content` is the value of register 189 for them.
     ///
     /// # Errors
     /// Those of `work`, and of [`Arm::write_checked`].
@@ -49,7 +50,7 @@ impl Arm {
     fn start_reports(&mut self, hz: u8, content: u8) -> Result<Vec<(u8, Vec<u8>)>, MoveError> {
         let mut rows = vec![(FEEDBACK_FREQUENCY, hz)];
         if self.has_extended_block()? {
-            // The content first: no report of another content is sent at this frequency.
+            // Write the content first, so that no report at this frequency has another content.
             rows.insert(0, (REPORT_CONTENT, content));
         }
         let mut before = Vec::new();

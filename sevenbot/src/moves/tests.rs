@@ -106,7 +106,7 @@ fn a_joint_that_gives_way_gets_its_target_from_no_other_program() {
     assert!(arm.joints().expect("an answer").target(Joint::ALL[2]) > sinking.target(Joint::ALL[2]) + 3);
 }
 
-/// The line to the arm is interrupted on the way, for some seconds.
+/// Interrupts the line to the arm during the playback, for this number of seconds.
 struct Interruption(SharedSimulation, u64);
 
 impl Observer for Interruption {
@@ -118,7 +118,7 @@ impl Observer for Interruption {
     }
 }
 
-/// The arm after an interruption, and whether the player told that it left the speeds.
+/// The arm after an interruption, and whether the player reported that it could not restore the speeds.
 fn after_interruption(seconds: u64) -> (Arm, bool) {
     let text = "7bot-recording 1\n0 90 90 65 90 90 90 80 0\n4 130 90 65 90 90 90 80 0\n";
     let mut player = Player::new(&Recording::parse(text).expect("a recording"), 1.0);

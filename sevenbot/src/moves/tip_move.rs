@@ -20,7 +20,7 @@ use crate::joints::{JointSnapshot, StepBaseError};
 use crate::units::{Angle, MoveTime, Speed};
 use host_link::Span;
 
-/// The targets that bring the tip to a position, as exact as an arm takes them.
+/// The targets that bring the tip to a position, in the finest resolution that the arm takes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TipMove {
     /// The targets of joints 1 to 5.
@@ -54,8 +54,8 @@ pub enum GuardedMoveError {
 }
 
 impl Arm {
-    /// Checks the way from where the joints are measured to these targets, at this pace; what it leaves open is that of the
-    /// registers. Joints without a target stay at theirs.
+    /// Checks the way from the measured positions to these targets, at this pace. A speed or duration that `pace` leaves open
+    /// comes from the registers. Joints without a target stay at their measured positions.
     ///
     /// # Errors
     /// The guard does not allow the way, or an exchange failed.
@@ -89,7 +89,7 @@ impl Arm {
     }
 }
 
-/// Where a straight line starts: the present targets, as exact as the arm has them.
+/// Where a straight line starts: at the present targets, in the finest resolution that the arm has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LineStart {
     /// The targets of all joints.

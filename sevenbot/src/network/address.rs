@@ -6,7 +6,8 @@ use std::{env, fmt};
 /// The environment variable with the token of servers that want one.
 pub const TOKEN_VARIABLE: &str = "SEVENBOT_TOKEN";
 
-/// The environment variable with the file, in PEM, of the certificates that servers with TLS may have.
+/// The environment variable with the path of a PEM file of certificates. The certificate of a server with TLS must be one of
+/// them, or be signed by one.
 pub const CERTIFICATE_VARIABLE: &str = "SEVENBOT_CERTIFICATE";
 
 /// The address of an arm behind a server.
@@ -48,7 +49,7 @@ impl Address {
         }
     }
 
-    /// Is it an address that other computers have, too?
+    /// Can other computers use this address, too?
     #[must_use]
     pub const fn is_of_network(&self) -> bool {
         matches!(self, Self::Tcp(_) | Self::Tls(_))
@@ -67,7 +68,7 @@ impl Address {
         !matches!(self, Self::Unix(_))
     }
 
-    /// The token that servers over TCP, also with TLS, may want: of the environment variable [`TOKEN_VARIABLE`].
+    /// The token in the environment variable [`TOKEN_VARIABLE`], for servers over TCP and TLS; `None` if it is empty or not set.
     pub(super) fn token() -> Option<String> {
         env::var(TOKEN_VARIABLE).ok().filter(|token| !token.is_empty())
     }
@@ -84,8 +85,8 @@ impl fmt::Display for Address {
     }
 }
 
-/// Can it be the token of a server? It is long enough not to be guessed, and fit for a line: 8 to 128 letters, digits and
-/// punctuation marks, without spaces.
+/// Can this text be the token of a server? A token has 8 to 128 letters, digits and punctuation marks of ASCII, and no
+/// spaces: so it is hard to guess, and fits on a line.
 #[must_use]
 pub fn is_token(token: &str) -> bool {
     (8..=128).contains(&token.len()) && token.bytes().all(|byte| byte.is_ascii_graphic())

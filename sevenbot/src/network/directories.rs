@@ -8,7 +8,7 @@ pub(super) fn runtime_directory() -> Option<PathBuf> {
     private(absolute("XDG_RUNTIME_DIR").or_else(state_base)?)
 }
 
-/// Where files are that outlive the session: `7bot` in the state directory. `None` if others can write there.
+/// The directory for files that outlive the session: `7bot` in the state directory. `None` if others can write there.
 pub(super) fn state_directory() -> Option<PathBuf> {
     private(state_base()?)
 }
@@ -33,7 +33,7 @@ fn is_private(directory: &Path) -> bool {
     use std::fs;
     use std::os::unix::fs::{DirBuilderExt, MetadataExt};
     let _ = fs::DirBuilder::new().recursive(true).mode(0o700).create(directory);
-    // The owner of what this process shows of itself, where the system has that, is this user.
+    // On Linux the owner of /proc/self is this user. On systems without it the owner is not checked.
     let user = fs::metadata("/proc/self").map(|shown| shown.uid()).ok();
     fs::symlink_metadata(directory).is_ok_and(|found| {
         let is_ours = user.is_none_or(|user| user == found.uid());

@@ -10,7 +10,7 @@ use super::address::Address;
 use super::directories::state_directory;
 
 const FILE: &str = "names";
-/// More names are forgotten, the oldest first.
+/// The largest number of names. The oldest ones are forgotten first.
 const MOST_NAMES: usize = 256;
 
 /// Why there is no place for the file.
@@ -20,7 +20,7 @@ const NO_DIRECTORY: &str = if cfg!(unix) {
     "names are remembered on Linux and macOS only"
 };
 
-/// A name, and where the arm was last.
+/// A name, and the last known address of its arm.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct KnownName {
     /// The name, as in `sevenbot://NAME`.
@@ -37,7 +37,7 @@ impl KnownName {
     }
 }
 
-/// What to do about a name that no arm may have.
+/// The rule for the name of an arm, as advice to a user whose name breaks it.
 pub const NAME_RULE: &str = "use 1 to 63 letters, digits and hyphens";
 
 /// May an arm have this name? See [`NAME_RULE`].
@@ -52,7 +52,7 @@ pub fn known_names() -> Vec<KnownName> {
     state_directory().map(|directory| read(&directory.join(FILE))).unwrap_or_default()
 }
 
-/// Remembers where an arm is, in the place of what was known before.
+/// Remembers the address of an arm. It replaces an earlier address of the same name.
 ///
 /// # Errors
 /// This user has no state directory that only they can write to, or the file cannot be written.
@@ -88,7 +88,7 @@ fn write(directory: &Path, names: &[KnownName]) -> io::Result<()> {
     let kept = names.get(names.len().saturating_sub(MOST_NAMES)..).unwrap_or_default();
     let text: String = kept.iter().map(|known| format!("{} {}\n", known.name, known.address)).collect();
     let new = directory.join(format!("{FILE}.{}.new", std::process::id()));
-    // Nobody else can write here, so what is there is of a program that was killed.
+    // Only this user can write here, so such a file is left from a program that was killed.
     let _ = fs::remove_file(&new);
     fs::File::create_new(&new)?.write_all(text.as_bytes())?;
     fs::rename(&new, directory.join(FILE))

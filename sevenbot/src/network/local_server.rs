@@ -1,5 +1,5 @@
-//! The servers of this user on this computer. Each has a file in a directory that nobody else can write to, with lines such as
-//! `port /dev/ttyUSB0`, and a Unix socket of the same name beside it.
+//! The servers of this user on this computer. Each has a file in a directory that only this user can write to, with lines such
+//! as `port /dev/ttyUSB0`, and a Unix socket of the same name beside it.
 
 use std::fs;
 use std::io;
@@ -8,7 +8,7 @@ use std::process;
 
 use super::directories::runtime_directory;
 
-/// What the file of a server ends with, and its socket.
+/// The extensions of a server's file and of its socket.
 const FILE: &str = "server";
 const SOCKET: &str = "sock";
 
@@ -19,7 +19,7 @@ pub struct LocalServer {
     pub socket: PathBuf,
     /// The serial port of its arm.
     pub port: PathBuf,
-    /// Its name.
+    /// The name of the server in `sevenbot://NAME`; `None` if it has no name.
     pub name: Option<String>,
 }
 
@@ -34,7 +34,7 @@ impl Drop for Registered {
 }
 
 impl LocalServer {
-    /// The server of this process. `None` if there is no directory for its files.
+    /// The server of this process, with `port` still empty. `None` if there is no directory for its files.
     #[must_use]
     pub fn of_this_process(name: Option<String>) -> Option<Self> {
         let socket = runtime_directory()?.join(format!("serve-{}.{SOCKET}", process::id()));

@@ -12,7 +12,7 @@ use super::known_names::KnownName;
 const SERVICE: &str = "_sevenbot._tcp.local.";
 /// The property of a server with TLS.
 const ENCRYPTED: (&str, &str) = ("tls", "1");
-/// How long answers are waited for.
+/// How long to wait for answers.
 const ANSWER_TIME: Duration = Duration::from_millis(1_500);
 
 /// An arm that a server of the network announces.
@@ -39,7 +39,7 @@ impl From<Announced> for KnownName {
 #[error("{0}")]
 pub struct AnnounceError(#[from] mdns_sd::Error);
 
-/// A name that is announced. Dropping it ends that.
+/// A name that is announced. Dropping it ends the announcement.
 pub struct Announcement {
     daemon: ServiceDaemon,
     name: String,
@@ -54,7 +54,7 @@ impl Announcement {
     pub fn new(name: &str, address: SocketAddr, is_encrypted: bool) -> Result<Self, AnnounceError> {
         let daemon = ServiceDaemon::new()?;
         if address.is_ipv4() {
-            // Nobody would answer at the addresses of IPv6.
+            // The server does not listen at the addresses of IPv6.
             daemon.disable_interface(IfKind::IPv6)?;
         }
         let host = format!("sevenbot-{name}.local.");
@@ -76,7 +76,7 @@ impl std::fmt::Debug for Announcement {
 
 impl Drop for Announcement {
     fn drop(&mut self) {
-        // Others learn at once that the name is gone.
+        // Tell others at once that the name is gone.
         if let Ok(done) = self.daemon.unregister(&self.name) {
             let _ = done.recv_timeout(Duration::from_millis(200));
         }
@@ -97,7 +97,7 @@ pub fn announced() -> Vec<Announced> {
     found
 }
 
-/// An arm by its name.
+/// The announced arm of this name; `None` if none answers within a second and a half.
 #[must_use]
 pub fn find(name: &str) -> Option<Announced> {
     let mut found = None;
@@ -120,7 +120,7 @@ fn browse(mut on_arm: impl FnMut(Announced) -> bool) -> Result<(), mdns_sd::Erro
         let ServiceEvent::ServiceResolved(service) = event else { continue };
         let name =
             service.fullname.strip_suffix(SERVICE).unwrap_or_default().trim_end_matches('.').to_owned();
-        // IPv4 first: an address of IPv6 may need a scope. That of loopback last: it is each computer's own.
+        // Prefer IPv4, because an IPv6 address may need a scope. Take a loopback address last: every computer has it.
         let addresses = service.addresses.iter().map(mdns_sd::ScopedIp::to_ip_addr);
         let Some(address) = addresses.min_by_key(|ip| (ip.is_loopback(), *ip)) else { continue };
         let is_encrypted = service.txt_properties.get_property_val_str(ENCRYPTED.0) == Some(ENCRYPTED.1);

@@ -1,5 +1,5 @@
-//! Arms that are not at a serial port: behind `sevenbot serve`, or simulated in this program. Addresses in the place of a port,
-//! and the servers of this computer.
+//! Arms that are not at a serial port: behind `sevenbot serve`, or simulated in this program. An address takes the place of
+//! the port's name. Also lists the servers of this computer.
 //!
 //! ```text
 //!   tcp://HOST:PORT ──▶ address ──▶ socket_line ──▶ Arm
@@ -34,12 +34,12 @@ pub use self::socket_line::SocketLine;
 /// variable [`TOKEN_VARIABLE`].
 ///
 /// # Errors
-/// The port cannot be opened, or the server not be reached.
+/// The port cannot be opened, or the server cannot be reached.
 pub fn open_line(name: &str, baud: u32) -> Result<Box<dyn HostLine>, OpenError> {
     open_line_with_token(name, baud, None)
 }
 
-/// As [`open_line`], but with this token, if there is one.
+/// As [`open_line`], with this token; `None`: the token of the environment variable.
 ///
 /// # Errors
 /// As [`open_line`].

@@ -17,7 +17,7 @@ use crate::host_line::HostLine;
 const SHORTEST_WAIT: Duration = Duration::from_millis(1);
 /// After this time a server that takes no bytes has failed.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(2);
-/// How long a computer may take to answer.
+/// How long a server may take to accept the connection, and to answer each step of the TLS handshake.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// A stream of bytes whose reads have a timeout.
@@ -55,9 +55,9 @@ impl fmt::Debug for SocketLine {
 }
 
 impl SocketLine {
-    /// Connects to a server. Over TCP it gets this token, or without one that of the environment variable
-    /// [`TOKEN_VARIABLE`](super::TOKEN_VARIABLE). With TLS the certificate is one of those in the file of
-    /// [`CERTIFICATE_VARIABLE`](super::CERTIFICATE_VARIABLE).
+    /// Connects to a server. A server over TCP gets `token`; `None`: the token in the environment variable
+    /// [`TOKEN_VARIABLE`](super::TOKEN_VARIABLE). With TLS, the certificate of the server must be one in the file of
+    /// [`CERTIFICATE_VARIABLE`](super::CERTIFICATE_VARIABLE), or be signed by one there.
     ///
     /// # Errors
     /// There is no such server, or it cannot be reached.
@@ -77,11 +77,11 @@ impl SocketLine {
     }
 }
 
-/// Connects to a server of the local network: where its name is announced now, or else where it was last.
+/// Connects to a server of the local network: at the address that it announces now, or else at its last known address.
 fn connect_named(name: &str, token: Option<&str>) -> Result<Box<dyn Stream>, OpenError> {
     if let Some(known) = announced(name) {
         let stream = connect_known(&known, token)?;
-        // It is for networks that block multicast. Without the file, names are found as before.
+        // The remembered address is for networks that block multicast. Announced names work without it.
         let _ = remember(&known);
         return Ok(stream);
     }
@@ -108,7 +108,7 @@ const fn announced(_: &str) -> Option<KnownName> {
     None
 }
 
-/// `host`: the connection is encrypted, and the certificate is for this host.
+/// `host`: the connection is encrypted, and the certificate must be for this host; `None`: no encryption.
 fn connect_tcp(address: &str, host: Option<&str>, token: Option<&str>) -> Result<Box<dyn Stream>, OpenError> {
     let addresses =
         std::net::ToSocketAddrs::to_socket_addrs(address).map_err(|error| match error.kind() {

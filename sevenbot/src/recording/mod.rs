@@ -93,8 +93,8 @@ impl Recording {
     /// From moments in ascending order of time.
     ///
     /// # Errors
-    /// There is none, or the first one that is refused: it is not later than the one before, or later than a day. The number is
-    /// that of the moment, from 1.
+    /// [`RecordingError::Empty`] if there are no moments. [`RecordingError::Line`] for the first moment that is not later than
+    /// the one before, or that is later than a day; its `number` counts the moments from 1.
     pub fn of_moments(moments: impl IntoIterator<Item = Moment>) -> Result<Self, RecordingError> {
         Self::in_order((1..).zip(moments).map(|(number, moment)| (number, line::checked(moment))))
     }

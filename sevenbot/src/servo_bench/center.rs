@@ -172,7 +172,7 @@ fn measure(bus: &mut BusMaster, id: u8) -> Result<(Reading, u8, bool), CenterErr
 struct CenterCheck {
     /// The smallest distance to the middle, in counts.
     closest: u16,
-    /// When the servo was that close first.
+    /// When the servo first came that close.
     since: Duration,
     /// Consecutive readings above the load limit.
     overloaded: u32,

@@ -69,7 +69,7 @@ pub fn get_all(bus: &mut BusMaster, id: u8) -> Result<Vec<ServoValue>, ServoErro
 
 /// Writes a register, and reads it back. Opens the EEPROM for a register of the EEPROM, and locks it again.
 ///
-/// After a new baud rate the bus has that rate, too.
+/// A new baud rate of the servo becomes the rate of the bus, too.
 ///
 /// # Errors
 /// Each variant of [`SetError`] tells the state of the servo.

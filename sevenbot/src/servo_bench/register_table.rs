@@ -1,6 +1,6 @@
 //! The registers of a servo by name: where they are, their ranges, and what their values mean.
 //!
-//! The only table of their names, widths, ranges and units. The addresses that the controller uses are
+//! The only table of their names, widths, ranges and units. The addresses that the controller uses are in
 //! [`super::register`].
 
 use motion_core::servo_bus::frame::{BAUD_RATES, register};
@@ -12,7 +12,7 @@ use super::MAX_ID;
 pub enum ServoMemory {
     /// Kept without power, and protected by the lock.
     Eeprom,
-    /// Set back when the power goes.
+    /// Reset when the power goes off.
     Ram,
     /// Measured or fixed: it cannot be written.
     ReadOnly,
@@ -176,7 +176,7 @@ impl ServoRegister {
         bytes.into_iter().skip(2 - usize::from(self.width.clamp(1, 2))).collect()
     }
 
-    /// The value as text, if the number alone says little: the baud rate of a code.
+    /// What the number means: the baud rate of a code, the state of the lock, the names of error bits; otherwise the unit.
     #[must_use]
     pub fn meaning(&self, value: i32) -> String {
         match self.address {

@@ -4,8 +4,8 @@
 //!   each rate ──▶ each id: a question with a short timeout ──▶ candidates ──▶ each: questions with the full timeout
 //! ```
 //!
-//! The first pass takes 5 ms for an id at 1 Mbaud. A slow USB adapter delivers an answer after that, while another id
-//! is asked. The late answer then makes its sender a candidate.
+//! The first pass takes up to 4.3 ms for an id at 1 Mbaud. A slow USB adapter delivers an answer after that, while another
+//! id is asked. The late answer then makes its sender a candidate.
 
 use std::ops::RangeInclusive;
 use std::time::Duration;
@@ -156,7 +156,7 @@ fn candidates(
         if is_answered || is_damaged {
             candidates.push(id);
         }
-        // A late damaged answer may belong to the question before.
+        // A late damaged answer may belong to the previous question.
         candidates.extend(damaged_before.filter(|_| is_damaged));
         damaged_before = Some(id);
         done += 1;

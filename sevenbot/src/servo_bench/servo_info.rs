@@ -91,7 +91,8 @@ impl ServoInfo {
         Joint::from_index(self.id)
     }
 
-    /// The joint's angle in degrees, without the offset that the arm's controller stores.
+    /// The joint's angle in degrees, without the offset that the arm's controller stores. `None` without a position, or if
+    /// no joint has this id.
     #[must_use]
     pub fn degrees(&self) -> Option<f64> {
         let counts = self.reading?.position_counts;

@@ -5,7 +5,7 @@
 //!                       └─ groups of arms, each taken by the next free thread
 //! ```
 //!
-//! The controllers parse real frames, and what is observed is the reply to a read. The line takes no time, so the reply is
+//! The controllers parse real frames, and an observation is the reply to a read. The line takes no time, so the reply is
 //! there at once. Each arm has a time, faults and a seed of its own, so the results do not depend on the number of threads.
 //!
 //! ```
@@ -48,9 +48,9 @@ pub use outside::{DRIVES, MEASURED, SET_POINTS, SET_VELOCITIES, WANTED};
 pub use step_error::StepError;
 use threads::share;
 
-/// Arms that a thread takes at a time: the work of some 100 microseconds, so that taking them costs nothing.
+/// Arms that a thread takes at a time. A step of them takes some 100 microseconds, much longer than taking them.
 const GROUP: usize = 16;
-/// After power-up the servos start, and the joints are measured.
+/// The time from power-up to the first step: the servos start, and the joints are measured.
 const START: time::Duration = time::Duration::from_millis(1_000);
 
 /// Arms that step together.
@@ -63,7 +63,7 @@ pub struct SimulatedArms {
 }
 
 impl SimulatedArms {
-    /// An arm for each seed, which its line draws random faults from. At most `threads` threads step them.
+    /// An arm for each seed. The seed determines the random faults of the arm's line. At most `threads` threads step the arms.
     #[must_use]
     pub fn new(seeds: &[u64], threads: NonZeroUsize) -> Self {
         let mut started =
@@ -85,7 +85,7 @@ impl SimulatedArms {
     /// writes it into [`WIDTH`] numbers. Without targets the arms get no frame but the read.
     ///
     /// # Errors
-    /// The first target that is out of range, the time or the lengths: then nothing is done.
+    /// A target is out of range (the first one is named), or the time or a length is wrong. Then nothing is done.
     pub fn step<T: Number, N: Number>(
         &mut self,
         targets: Option<&[T]>,
@@ -96,7 +96,7 @@ impl SimulatedArms {
         self.check_length(observations.len(), WIDTH)?;
         targets.map_or(Ok(()), |targets| self.check(targets))?;
         let rows = observations.chunks_mut(GROUP * WIDTH);
-        // Without targets each group gets an empty slice, and so each arm none.
+        // Without targets each group gets an empty slice, and no arm gets targets.
         let targets = targets.unwrap_or_default().chunks(GROUP * JOINTS);
         let targets = targets.chain(std::iter::repeat(&[][..]));
         let threads = self.threads.get().min(self.arms.len().div_ceil(GROUP));
@@ -124,8 +124,8 @@ impl SimulatedArms {
         Ok(())
     }
 
-    /// Lets another simulation move the joints: tells each arm what that one measured ([`MEASURED`] numbers), lets `time` pass,
-    /// and writes what the servos want then ([`WANTED`] numbers).
+    /// Lets another simulation move the joints. Gives each arm the measurements of that simulation ([`MEASURED`] numbers), lets
+    /// `time` pass, and then writes what the servos aim at ([`WANTED`] numbers).
     ///
     /// ```
     /// use sevenbot::simulated_arms::{DRIVES, MEASURED, SET_POINTS, SimulatedArms, WANTED};
@@ -147,7 +147,7 @@ impl SimulatedArms {
     /// ```
     ///
     /// # Errors
-    /// The first measurement that is not a number, the time or the lengths: then nothing is done.
+    /// A measurement is not a number (the first one is named), or the time or a length is wrong. Then nothing is done.
     pub fn exchange<T: Number, N: Number>(
         &mut self,
         measured: &[T],
@@ -174,7 +174,7 @@ impl SimulatedArms {
     /// Reads each arm's state, and writes it into [`WIDTH`] numbers. No time passes.
     ///
     /// # Errors
-    /// The length.
+    /// `observations` has the wrong length.
     pub fn read<N: Number>(&mut self, observations: &mut [N]) -> Result<(), StepError> {
         self.check_length(observations.len(), WIDTH)?;
         self.arms.iter_mut().for_each(SteppedArm::observe);
@@ -195,29 +195,29 @@ impl SimulatedArms {
         })
     }
 
-    /// Writes what is known of each arm into [`WIDTH`] numbers. No time passes.
+    /// Writes the last known state of each arm into [`WIDTH`] numbers, without a read. No time passes.
     ///
     /// # Errors
-    /// The length.
+    /// `observations` has the wrong length.
     pub fn observe<N: Number>(&self, observations: &mut [N]) -> Result<(), StepError> {
         self.check_length(observations.len(), WIDTH)?;
         self.arms.iter().zip(observations.chunks_mut(WIDTH)).for_each(|(arm, row)| arm.write_row(row));
         Ok(())
     }
 
-    /// Makes the arms of the mask, or all, as this one is, or as an arm that has just started. Faults and loads are those
-    /// of that arm, too; each keeps its seed.
+    /// Makes the arms of the mask, or all, copies of `other`; `None`: of an arm that has just started. Faults and loads are
+    /// copied, too. Each arm keeps its seed.
     pub fn reset(&mut self, mask: Option<&[bool]>, other: Option<&Simulation>) {
         let other = other.unwrap_or(&self.started);
         masked(&mut self.arms, mask).for_each(|(_, arm)| arm.become_copy(other));
     }
 
-    /// Does something to each arm of the mask, or to all. Gets the arm's number.
+    /// Calls `work` for each arm of the mask, or for all, with the arm's number from 0.
     pub fn each(&mut self, mask: Option<&[bool]>, mut work: impl FnMut(usize, &mut Simulation)) {
         masked(&mut self.arms, mask).for_each(|(index, arm)| work(index, &mut arm.simulation));
     }
 
-    /// Draws the faults of an arm's line from this seed from its next reset on.
+    /// Sets the seed of an arm's line faults. It takes effect at the arm's next reset.
     pub fn set_seed(&mut self, arm: usize, seed: u64) {
         self.arms.get_mut(arm).into_iter().for_each(|arm| arm.seed = seed);
     }
@@ -243,18 +243,18 @@ fn masked<'a>(
     arms.iter_mut().enumerate().filter(move |(index, _)| is_chosen(*index))
 }
 
-/// Checked targets.
+/// The targets in hundredths of a degree; `None` if one is out of range.
 fn fine<T: Number>(degrees: &[T; JOINTS]) -> Option<[FineAngle; JOINTS]> {
     let [a, b, c, d, e, f, g] = degrees.map(|degrees| FineAngle::from_degrees(degrees.widen()));
     Some([a?, b?, c?, d?, e?, f?, g?])
 }
 
-/// The time of a step, which is a set-point period ([D23](protocol_core::decisions#d23)).
+/// The time of a step in milliseconds; `None` if it is no set-point period ([D23](protocol_core::decisions#d23)).
 fn milliseconds(time: Duration) -> Option<u16> {
     whole_milliseconds(time).filter(|time| *time >= 5)
 }
 
-/// A time of 1 to 1000 ms.
+/// The milliseconds of a time; `None` if they are not whole, or not 1 to 1000.
 fn whole_milliseconds(time: Duration) -> Option<u16> {
     let milliseconds = u16::try_from(time.as_millis()).ok().filter(|time| (1..=1_000).contains(time))?;
     (Duration::from_millis(milliseconds.into()) == time).then_some(milliseconds)

@@ -6,7 +6,7 @@ use super::one_arm::SteppedArm;
 use crate::cartesian::TipPose;
 use crate::fine_angle::FineAngle;
 
-/// The numbers of an observation.
+/// How many numbers an observation has.
 pub const WIDTH: usize = 32;
 /// Measured positions in degrees; NaN for a joint that was not measured.
 pub const POSITIONS: Range<usize> = 0..7;

@@ -12,7 +12,7 @@ use crate::fine_state::FineState;
 
 /// What each step reads: positions, velocities, loads and blocked joints.
 const READ: Span = Span::between(&FINE_POSITION, &BLOCKED_JOINTS);
-/// A joint that was not measured.
+/// The state of an arm that has not replied yet.
 const UNMEASURED: FineState = FineState { positions: [None; 7], velocities: [0; 7], loads: [0; 7] };
 
 /// An arm, and what its host knows of it.
@@ -35,7 +35,7 @@ impl SteppedArm {
         Self { simulation, seed, period: None, state: UNMEASURED, blocked: 0, heard }
     }
 
-    /// Makes the arm as this one is. Its line draws faults from the arm's own seed.
+    /// Makes the arm a copy of `other`. The faults of its line follow from its own seed.
     pub(crate) fn become_copy(&mut self, other: &Simulation) {
         *self = Self::new(other.clone(), self.seed);
         self.simulation.set_seed(self.seed);
@@ -70,7 +70,7 @@ impl SteppedArm {
         self.simulation.send_request(&Request::Write { address, values });
     }
 
-    /// Asks for the state. A reply that was lost or is late leaves the last one.
+    /// Asks for the state. If the reply is lost or late, the last state stays.
     pub(crate) fn observe(&mut self) {
         self.simulation.send_request(&Request::Read { address: READ.address(), count: READ.count() });
         let received = self.simulation.take_received();

@@ -11,10 +11,10 @@ use protocol_core::time::Duration;
 use super::observation::Number;
 use super::step_error::{MOST, StepError};
 
-/// The numbers of a measurement: seven positions in degrees, seven velocities in degrees per second, seven loads in percent of
-/// the stall torque, as in an observation. A joint whose position is NaN is moved by the simulation here.
+/// How many numbers a measurement has: seven positions in degrees, seven velocities in degrees per second, seven loads in
+/// percent of the stall torque, as in an observation. This simulation moves a joint whose position is NaN.
 pub const MEASURED: usize = 3 * JOINTS;
-/// The numbers of what the servos want.
+/// How many numbers an exchange returns: [`SET_POINTS`], [`SET_VELOCITIES`] and [`DRIVES`].
 pub const WANTED: usize = 3 * JOINTS;
 /// The angles that the servos' control aims at, in degrees.
 pub const SET_POINTS: Range<usize> = 0..7;
@@ -23,7 +23,7 @@ pub const SET_VELOCITIES: Range<usize> = 7..14;
 /// 1: the motor drives its joint; 2: it damps it; 0: it does neither.
 pub const DRIVES: Range<usize> = 14..21;
 
-/// The first measurement that is no number where the position is one.
+/// Fails at the first measurement that is not a number or too large, of a joint whose position is not NaN.
 pub(super) fn check<T: Number>(measured: &[T]) -> Result<(), StepError> {
     for (arm, row) in measured.chunks(MEASURED).enumerate() {
         for joint in 1..=JOINTS {
@@ -42,12 +42,12 @@ fn of_joint<T: Number>(row: &[T], joint: usize) -> [f64; 3] {
     [0, 1, 2].map(|kind| row.get(kind * JOINTS + joint - 1).map_or(f64::NAN, |value| value.widen()))
 }
 
-/// Does the simulation here move the joint?
+/// Does this simulation move the joint?
 const fn is_inside([position, ..]: [f64; 3]) -> bool {
     position.is_nan()
 }
 
-/// Tells the arm what was measured, lets time pass, and writes what the servos want.
+/// Gives the arm the measurements, lets time pass, and writes what the servos aim at.
 pub(super) fn exchange<T: Number, N: Number>(
     arm: &mut Simulation,
     measured: &[T],

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-/// Measurements beyond this are no degrees, and no degrees per second.
+/// The largest magnitude of a measurement, in its unit. A larger one is an error of the other simulation.
 pub(super) const MOST: f64 = 100_000.0;
 
 /// Why the arms did not step. No time has passed for any of them.
@@ -31,13 +31,13 @@ pub enum StepError {
         /// The measurement.
         value: f64,
     },
-    /// The time of an exchange.
+    /// The time of an exchange is not 1 to 1000 whole milliseconds.
     #[error("an exchange for {} s: use 0.001 to 1 s in whole milliseconds", .0.as_secs_f64())]
     ExchangeTime(Duration),
-    /// The time of a step.
+    /// The time of a step is not 5 to 1000 whole milliseconds.
     #[error("a step of {} s: use 0.005 to 1 s in whole milliseconds", .0.as_secs_f64())]
     Time(Duration),
-    /// A slice of another length than that of all arms.
+    /// A slice has another length than the arms need.
     #[error("{given} numbers: {wanted} are needed")]
     Length {
         /// The length of the slice.

@@ -147,7 +147,7 @@ fn arms_whose_joints_are_moved_outside_do_not_depend_on_the_threads() {
             row[..JOINTS].copy_from_slice(&REST);
             row[6] = f64::NAN;
         }
-        // At the end the joints of this simulation settle.
+        // The targets stay the same from step 19 on, so that the joint of this simulation settles.
         for step in 0..40 {
             let all: Vec<f64> = (0..40).flat_map(|arm| targets(arm, step.min(19))).collect();
             arms.send(&all, STEP).expect("targets");

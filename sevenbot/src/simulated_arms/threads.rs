@@ -19,7 +19,7 @@ where
     };
     thread::scope(|scope| {
         for _ in 1..threads {
-            // Without a thread, the others do its work.
+            // If a thread cannot be started, the others do its work.
             let _ = thread::Builder::new().spawn_scoped(scope, run);
         }
         run();

@@ -1,11 +1,11 @@
-//! The points of a program that does not wait for them: which one a sender sends when. Arithmetic without an arm or a clock.
+//! Turns the actions of a program, which come at any time, into the points of a stream. Arithmetic without an arm or a clock.
 //!
 //! ```text
 //!   offer ──▶ the newest action ──▶ next: Send it when a point is due, and again each period, while the program is there
 //!                                         AskWatchdog once the program was silent for long
 //! ```
 //!
-//! Times are those since any instant of one clock, such as [`Arm::elapsed`](crate::Arm::elapsed).
+//! All times count from the same instant, as [`Arm::elapsed`](crate::Arm::elapsed) does.
 
 use std::time::Duration;
 
@@ -18,7 +18,7 @@ use crate::fine_state::FineTargets;
 pub enum LatestStep {
     /// Send this point: [`SetPointStream::send`](super::SetPointStream::send).
     Send(FineTargets),
-    /// Ask whether the watchdog of the arm has acted, and tell it by [`LatestPoints::watchdog_acted`].
+    /// Read whether the watchdog of the arm has acted, and if so call [`LatestPoints::watchdog_acted`].
     AskWatchdog,
 }
 
@@ -72,10 +72,10 @@ struct Leading {
     pace: StreamPace,
     /// The newest angle of each joint.
     newest: FineTargets,
-    /// No point with these angles was sent yet.
+    /// Does the newest action wait for its point?
     is_new: bool,
     offered: Duration,
-    /// The program has been silent, and the watchdog was asked for.
+    /// Was [`LatestStep::AskWatchdog`] returned in this silence of the program?
     was_asked: bool,
 }
 
@@ -86,8 +86,8 @@ impl LatestPoints {
         Self { options, leading: None, counts: LatestCounts::default() }
     }
 
-    /// Takes an action. A joint without an angle keeps that of the action before. The first point is due at once, and so is
-    /// that after a silence.
+    /// Takes an action. A joint without an angle keeps the angle of earlier actions. The first point is due at once, and so is
+    /// the first one after a silence.
     pub fn offer(&mut self, now: Duration, action: &FineTargets) {
         let is_silent = self.is_silent(now);
         let Some(leading) = &mut self.leading else {
@@ -138,7 +138,8 @@ impl LatestPoints {
         (!leading.was_asked).then(|| leading.asks_at(watchdog))
     }
 
-    /// Has the program offered nothing for the time of the watchdog? Then the sender sends nothing.
+    /// Has the program offered nothing for the time of the watchdog? Then the sender sends nothing. Also true before the first
+    /// action.
     #[must_use]
     pub fn is_silent(&self, now: Duration) -> bool {
         let watchdog = self.options.watchdog_time();
@@ -157,7 +158,7 @@ impl LatestPoints {
         self.leading.as_ref().is_some_and(|leading| leading.is_new)
     }
 
-    /// The next point is due at `now`: the sender did something else meanwhile.
+    /// Makes the next point due at `now`, after the sender did something else.
     pub fn restart(&mut self, now: Duration) {
         self.leading.iter_mut().for_each(|leading| leading.pace.restart(now));
     }
@@ -184,7 +185,7 @@ impl Leading {
         watchdog.is_some_and(|time| now >= self.offered + time)
     }
 
-    /// By then the watchdog has acted: the last frame was sent before the program counted as silent.
+    /// When to ask. By then the watchdog has acted, because the last frame was sent before the program counted as silent.
     fn asks_at(&self, watchdog: Option<Duration>) -> Duration {
         self.offered + 2 * watchdog.unwrap_or_default() + WATCHDOG_MARGIN
     }
@@ -209,7 +210,7 @@ mod tests {
         START + Duration::from_millis(millis)
     }
 
-    /// What a sender sends that wakes up when it has something to do.
+    /// The steps of a sender that wakes up at [`LatestPoints::wake_at`].
     fn sent_until(points: &mut LatestPoints, end: Duration) -> Vec<(Duration, LatestStep)> {
         let mut sent = Vec::new();
         while let Some(now) = points.wake_at().filter(|now| *now < end) {

@@ -1,5 +1,5 @@
-//! When the points of a stream are due, and how well they kept to it: arithmetic without an arm or a clock. Times are those
-//! since any instant of one clock, such as [`Arm::elapsed`](crate::Arm::elapsed).
+//! When the points of a stream are due, and how late they were sent: arithmetic without an arm or a clock. All times count
+//! from the same instant, as [`Arm::elapsed`](crate::Arm::elapsed) does.
 
 use std::time::Duration;
 
@@ -41,7 +41,7 @@ pub struct PaceCounts {
 }
 
 impl PaceCounts {
-    /// The standard deviation of the times at which the points were sent from their due times.
+    /// The standard deviation of the delays between the due times of points and the times when they were sent.
     #[must_use]
     pub fn jitter(&self) -> Duration {
         let count = f64::from(self.points.max(1));
@@ -70,7 +70,7 @@ impl StreamPace {
     }
 
     /// The number of the point to send at `now`: the next one, or a later one if that is due already. The arm would pass
-    /// over the ones before (D23).
+    /// over the earlier ones (D23).
     #[must_use]
     pub fn number_at(&self, now: Duration) -> u32 {
         let lateness = now.saturating_sub(self.due());

@@ -19,7 +19,7 @@ fn arm() -> (Arm, SharedSimulation) {
     (arm, simulation)
 }
 
-/// Notes the true angle of joint 1 whenever it is asked, in thousandths of a degree.
+/// Records the true angle of joint 1 at each call: the time in microseconds, and the angle in thousandths of a degree.
 struct Witness {
     simulation: SharedSimulation,
     seen: Vec<(u64, i32)>,

@@ -26,7 +26,7 @@ fn a_lost_read_is_repeated() {
 #[test]
 fn a_silent_port_differs_from_garbage() {
     let received = |bytes: &'static [u8]| {
-        // How many reads follow depends on the machine.
+        // The number of further reads depends on the machine.
         let (name, _port) = answering_arm(move |read, _, _| if read < 3 { bytes.to_vec() } else { vec![] });
         match Arm::open_with(&name, options()) {
             Err(OpenError::Silent(Error::NoAnswer { attempts: 3, received, .. })) => received,
@@ -35,7 +35,7 @@ fn a_silent_port_differs_from_garbage() {
     };
     let garbage = ReceiveCounts { bytes: 21, ..ReceiveCounts::default() };
     let damaged = ReceiveCounts { damaged_frames: 3, ..garbage };
-    // Side by side, because each waits for the end of its attempts.
+    // In parallel, because each waits until all its attempts time out.
     thread::scope(|scope| {
         scope.spawn(|| assert_eq!(received(b""), ReceiveCounts::default()));
         scope.spawn(|| assert_eq!(received(b"garbage"), garbage));

@@ -22,7 +22,7 @@ type Registers = Arc<Mutex<[u8; 256]>>;
 
 const ALL: u8 = 0x7F;
 
-/// An arm with all blocks, and its registers. Every frame counts.
+/// An arm with all blocks, and its registers. It counts the frames that it accepts.
 fn arm() -> (Arm, Registers, TTYPort) {
     let registers = moving_registers();
     {

@@ -130,7 +130,7 @@ fn the_period_of_another_program_is_put_back_after_a_failure() {
     assert_eq!(shown.lock().unwrap()[184..186], [20, 0]);
 }
 
-/// The first write before which the program that streams ends its stream.
+/// The write before which the other program ends its stream: that of the stop, or that of the restored period.
 #[derive(Clone, Copy)]
 enum StreamEnd {
     Never,

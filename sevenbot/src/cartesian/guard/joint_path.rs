@@ -1,7 +1,7 @@
 //! The way of the joints from one pose to another, as the controller moves them.
 //!
-//! Each joint turns at a constant speed (D10, D11). All start together, and each arrives when it does. The tip describes a
-//! curve, which may be lower than both ends.
+//! Each joint turns at a constant speed (D10, D11). All start together, but may arrive at different times. The tip describes
+//! a curve, which may be lower than both ends.
 
 use crate::units::{MoveTime, Speed};
 
@@ -45,8 +45,8 @@ impl JointPath {
         Self { from, to, seconds }
     }
 
-    /// The fraction of the duration and the angles, from the start to the end. No joint turns by more than 0.1 degrees
-    /// between two of them.
+    /// The poses from the start to the end, each with its fraction of the duration. No joint turns by more than 0.1 degrees
+    /// between two poses.
     pub fn poses(&self) -> impl Iterator<Item = (f64, [f64; 5])> {
         let duration = self.seconds.iter().copied().fold(0.0, f64::max);
         let times = std::iter::successors(Some(0.0), move |&time| self.next_time(time, duration));
@@ -56,7 +56,7 @@ impl JointPath {
         })
     }
 
-    /// When the fastest of the joints that still turn has turned by a step.
+    /// The time at which the fastest joint that still turns has turned by one more step; `None` at the end of the way.
     fn next_time(&self, time: f64, duration: f64) -> Option<f64> {
         if time >= duration {
             return None;

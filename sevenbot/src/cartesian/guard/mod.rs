@@ -21,10 +21,10 @@ mod joint_path;
 
 pub use joint_path::JointPath;
 
-/// Targets in hundredths of a degree take the tip by less than this from the point, in mm.
+/// Rounding the targets to 0.01 degrees moves the tip by less than this, in mm.
 const ROUNDING_MM: f64 = 0.1;
 
-/// What keeps the arm above a table and out of its base.
+/// Refuses poses and ways that take the arm below a table or into its own base.
 ///
 /// ```
 /// use sevenbot::cartesian::Guard;
@@ -38,7 +38,7 @@ const ROUNDING_MM: f64 = 0.1;
 pub struct Guard(Workspace);
 
 impl Guard {
-    /// A guard with the table at this height in mm. The foot of the base is at -60, as the table of the default.
+    /// A guard with the table at this height in mm. The default is -60, the foot of the base.
     #[must_use]
     pub const fn above(table_mm: f64) -> Self {
         Self(Workspace { table: table_mm })
@@ -50,7 +50,7 @@ impl Guard {
         self.0.table
     }
 
-    /// Checks the angles of joints 1 to 5, in degrees. Less than 0.1 mm is rounding.
+    /// Checks the angles of joints 1 to 5, in degrees. A depth of up to 0.1 mm counts as rounding and is allowed.
     ///
     /// # Errors
     /// The part that is deepest in an obstacle.
@@ -59,7 +59,7 @@ impl Guard {
         if breach.depth_mm > ROUNDING_MM { Err(breach) } else { Ok(()) }
     }
 
-    /// Do these exact angles of joints 1 to 5 break nothing, with no allowance for rounding?
+    /// Is the arm outside every obstacle at these angles of joints 1 to 5, with no allowance for rounded targets?
     pub(super) fn is_clear(&self, angles: [f64; 5]) -> bool {
         // A millionth of a millimetre is the rounding of the arithmetic.
         self.depth(angles).depth_mm < 1e-6
@@ -67,14 +67,14 @@ impl Guard {
 
     /// Checks a way of the joints, at each 0.1 degrees of the fastest one.
     ///
-    /// Between two checks no point of the arm moves by more than 1.4 mm. So the way comes at most 0.7 mm nearer to the
-    /// base than it does at a check, and the margin is 10 mm. The table is flat: there the difference is the bend of the
-    /// way between two checks, below 0.001 mm.
+    /// Between two checks no point of the arm moves by more than 1.4 mm. So between checks the arm comes at most 0.7 mm
+    /// nearer to the base than at a check, and the margin round the base is 10 mm. The table is flat: the way of a point
+    /// bends towards it by less than 0.001 mm between two checks.
     ///
     /// A way that begins inside an obstacle may leave it, but go no deeper.
     ///
     /// # Errors
-    /// The deepest place.
+    /// The deepest place of the way that breaks the guard.
     pub fn check_path(&self, path: &JointPath) -> Result<(), PathBreach> {
         let mut escape = Escape::default();
         let mut deepest: Option<PathBreach> = None;
@@ -111,7 +111,8 @@ impl Guard {
     }
 }
 
-/// How deep a way may still be: as deep as it was before, once it has left an obstacle not at all.
+/// The depth in an obstacle that a way may still have: at most its least depth so far, and none once it was outside. The
+/// first pose may have any depth.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Escape {
     depth_mm: Option<f64>,
@@ -134,7 +135,7 @@ pub struct Breach {
     pub part: Part,
     /// The obstacle.
     pub obstacle: Obstacle,
-    /// How deep it is, in mm.
+    /// How deep the part is in the obstacle, in mm.
     pub depth_mm: f64,
     /// The height of the table, in mm.
     pub table_mm: f64,
@@ -192,7 +193,7 @@ impl std::error::Error for PathBreach {}
 /// The first place of a recording inside an obstacle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TimedBreach {
-    /// The time of the moment there, or on the way to it.
+    /// The time of the moment at this place, or of the next moment if the place is between two.
     pub time: Duration,
     /// What breaks the guard there.
     pub breach: Breach,

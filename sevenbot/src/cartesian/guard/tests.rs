@@ -170,7 +170,7 @@ fn an_allowed_way_never_takes_a_point_below_the_table_or_into_the_base() {
             continue;
         }
         allowed += 1;
-        // Ten times as fine as the guard looks.
+        // Ten times as many poses as the guard checks.
         let mut before: Option<[f64; 5]> = None;
         for (_, pose) in path.poses() {
             for part in 0..10 {

@@ -31,14 +31,14 @@ pub enum StraightLineFault {
     Guarded(Breach),
     /// A joint would have to jump, because the line passes a singular position.
     Singular {
-        /// Its number.
+        /// The number of the joint.
         joint: u8,
         /// The necessary turn in degrees.
         degrees: f64,
     },
-    /// A joint would have to turn faster than its speed register allows.
+    /// A joint would have to turn faster than 190 degrees/s, the largest value of its speed register (D10).
     TooFast {
-        /// Its number.
+        /// The number of the joint.
         joint: u8,
         /// The necessary speed in degrees/s.
         degrees_per_second: f64,

@@ -1,4 +1,4 @@
-//! Rounds the exact angles of a line to targets that the arm takes, and measures what that costs.
+//! Rounds the exact angles of a line to targets that the arm takes, and measures the deviation that this causes.
 
 use std::time::Duration;
 
@@ -15,7 +15,7 @@ use crate::units::Angle;
 /// Angles of joints 1 to 5, in degrees.
 pub(super) type Angles = [f64; 5];
 
-/// The resolution of the targets, and with it the time between them.
+/// The resolution of the targets. It sets the time between them, too.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TargetResolution {
     /// Whole degrees, for playback with speeds.
@@ -67,7 +67,7 @@ impl Rounding {
         }
     }
 
-    /// The nearest whole degrees within the limits of the arm that the guard allows.
+    /// The nearest whole degrees, if they are within the limits of the arm and the guard allows them; otherwise the best ones.
     fn nearest_degrees(&self, angles: Angles, path: &TipPath, share: f64) -> [FineAngle; 5] {
         let whole = angles.map(f64::round);
         let [t1, t2, t3, t4, t5] = whole;
@@ -78,7 +78,7 @@ impl Rounding {
         self.best_degrees(angles, path, share)
     }
 
-    /// The nearest hundredths; whole degrees where those would break a limit of the arm.
+    /// The nearest hundredths; whole degrees if the hundredths would break a limit of the arm.
     fn nearest_hundredths(&self, angles: Angles, path: &TipPath, share: f64) -> [FineAngle; 5] {
         let fine = angles.map(in_range);
         let [t1, t2, t3, t4, t5] = fine.map(FineAngle::degrees);
@@ -86,7 +86,7 @@ impl Rounding {
         if is_legal { fine } else { self.best_degrees(angles, path, share) }
     }
 
-    /// The whole degrees within the limits that are nearest to the path. Those that the guard allows go first.
+    /// The whole degrees within the limits that are nearest to the path. Those that the guard allows are preferred.
     fn best_degrees(&self, angles: Angles, path: &TipPath, share: f64) -> [FineAngle; 5] {
         let (tip, tool) = path.at(share);
         let target = TipTarget::near(angles, tip, tool, self.guard.as_ref());

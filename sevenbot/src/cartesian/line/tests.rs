@@ -33,7 +33,7 @@ fn a_line_over_the_table_stays_on_it_but_for_whole_degrees() {
     assert!(line.deviation_mm > 0.1 && line.deviation_mm < 3.5, "{}", line.deviation_mm);
     assert!(line.tilt_degrees < 2.5, "{}", line.tilt_degrees);
     assert_eq!(line.first_turn, None);
-    // The reported deviation is that of the targets.
+    // The reported deviation is the largest one of the targets.
     let end = Vector::new(60.0, 200.0, 50.0);
     let way = (end - line.start.tip).unit().expect("a way");
     let mut worst: f64 = 0.0;
@@ -64,7 +64,7 @@ fn the_tool_turns_on_the_way_and_makes_the_line_slower() {
 
 #[test]
 fn joint_4_turns_first_where_it_moves_nothing() {
-    // To the side with the tool kept forward: the hand has to bend to the side from a straight forearm.
+    // The tip moves to the side and the tool stays forward, so the hand has to bend to the side from a straight forearm.
     let line = plan(STANDARD, [40.0, 250.0, 219.0], Vector::new(0.0, 1.0, 0.0), 30.0).expect("a line");
     let first = line.first_turn.expect("a turn of joint 4").degrees();
     assert!(!(20.0..=160.0).contains(&first), "{first}");

@@ -108,7 +108,7 @@ impl SimulatedWire {
 /// The line to the servos of a wire.
 struct WireLine {
     wire: Arc<Mutex<SimulatedWire>>,
-    /// The virtual time 0.
+    /// The time of the line's clock at virtual time 0.
     start: time::Instant,
 }
 
