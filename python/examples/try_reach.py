@@ -40,7 +40,7 @@ def observation(observed: sevenbot.Observation, goal: Array) -> Array:
 def reach(arm: sevenbot.Arm, policy: Array, goal: Array) -> float:
     """Lets the policy bring the tip to the goal. Returns how far from it the tip is in the end, in millimetres."""
     arm.pose([float(angle) for angle in REST], speed=38)
-    # The speed of a move stays set, and no point of a stream is approached faster: the policy has learned with this one.
+    # The speed registers also limit a stream. The policy has learned with this speed.
     arm.set("speed", SPEED)
     targets = REST.astype(np.float64)
     with arm.stream(DT, guard=False) as stream:

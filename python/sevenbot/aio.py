@@ -189,7 +189,7 @@ class Arm:
     async def __aexit__(self, *exception: Any) -> None:
         """Stops what moves, also in a task that waits for it, and closes the port."""
         if not self._is_closed:
-            # Not behind the call that runs: this ends it.
+            # Not in the queue behind the running call, because `__exit__` ends that call.
             await asyncio.to_thread(self.sync.__exit__, *exception)
             await self.close()
 

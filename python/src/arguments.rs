@@ -45,7 +45,7 @@ impl Goals {
         }
     }
 
-    /// As the library takes them.
+    /// The targets in the types of the library. Fails if an angle is not within 0 to 180 degrees.
     pub(crate) fn targets(&self, py: Python<'_>) -> PyResult<FineTargets> {
         let mut targets = [None; 7];
         for ((target, goal), number) in targets.iter_mut().zip(self.0).zip(1..) {

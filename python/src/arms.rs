@@ -39,7 +39,7 @@ const MOST_ARMS: i64 = 1_000_000;
 #[pyclass(frozen, module = "sevenbot")]
 pub(crate) struct SimulatedArms {
     arms: Arc<Mutex<library::SimulatedArms>>,
-    /// A forked process has a copy of the arms, whose lock may be held for ever.
+    /// The process that made the arms. A forked process has a copy of them, whose lock may be held for ever.
     process: u32,
     count: usize,
     threads: NonZeroUsize,
@@ -381,7 +381,7 @@ impl SimulatedArms {
 impl Drop for SimulatedArms {
     fn drop(&mut self) {
         if self.is_forked() {
-            // A thread that is not here may have been changing them: they are left as they are.
+            // At the fork, another thread may have been changing the arms. So this copy is never dropped.
             std::mem::forget(Arc::clone(&self.arms));
         }
     }

@@ -1,7 +1,7 @@
 //! numpy arrays of many arms, read and written in place.
 //!
-//! The crate `numpy` knows numpy's own interface, so it works with the ABI of Python 3.10. Python's buffer protocol is part of
-//! that ABI from 3.11 on only.
+//! The crate `numpy` uses numpy's own interface, which works with the stable ABI of Python 3.10. Python's buffer protocol is
+//! part of the stable ABI only from Python 3.11 on.
 
 use numpy::{
     Element, PyArray1, PyArray2, PyArrayDescrMethods, PyArrayMethods, PyReadonlyArray2, PyReadonlyArrayDyn,
@@ -16,7 +16,7 @@ use crate::numbers::{elements, seed};
 /// The rows and columns of an array.
 pub(crate) type Shape = [usize; 2];
 
-/// Without numpy there are no arrays.
+/// Imports numpy. Fails with the command that installs it.
 pub(crate) fn numpy(py: Python<'_>) -> PyResult<Bound<'_, PyModule>> {
     let missing = |_| PyImportError::new_err("many arms need numpy: pip install sevenbot[numpy]");
     py.import("numpy").map_err(missing)
@@ -49,7 +49,7 @@ pub(crate) fn given<'py, T: Element>(
     array.try_readonly().map_err(|_| in_use(py, what))
 }
 
-/// The array `out`, which is filled itself; a new one if there is none.
+/// The array `out` of the caller, which is filled in place; a new array if there is none.
 pub(crate) fn out<'py, T: Element>(
     py: Python<'py>,
     object: Option<&Bound<'py, PyAny>>,
@@ -82,7 +82,7 @@ fn in_use(py: Python<'_>, what: &str) -> PyErr {
     InvalidValue::raise(py, &format!("{what}: {reasons}: pass a copy, array.copy()"))
 }
 
-/// An array without gaps has a slice.
+/// The exception for an array with gaps, which cannot be used as a slice.
 pub(crate) fn gaps<E>(py: Python<'_>) -> impl Fn(E) -> PyErr {
     move |_| InvalidValue::raise(py, "an array has gaps: use numpy.ascontiguousarray")
 }

@@ -66,7 +66,7 @@ impl Problem {
 pub(crate) struct JointStatus {
     health: JointHealth,
     is_driven: bool,
-    /// Registers 0 to 255, of which the rest is made.
+    /// Registers 0 to 255, from which the other fields are computed.
     registers: Vec<u8>,
 }
 

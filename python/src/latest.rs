@@ -1,4 +1,4 @@
-//! What a program that does not wait and the thread of the port tell each other.
+//! Passes the actions of a program that does not wait to the thread of the port, and its counts and failures back.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -7,16 +7,16 @@ use sevenbot::fine::FineTargets;
 use sevenbot::moves::MoveError;
 use sevenbot::stream::LatestCounts;
 
-/// The newest action of a program, and what became of those before.
+/// The newest action of a program, and the counts and the failure of earlier ones.
 #[derive(Debug, Default)]
 pub(crate) struct LatestSlot(Mutex<Slot>);
 
 #[derive(Debug, Default)]
 struct Slot {
     is_open: bool,
-    /// The thread of the port has not taken it yet.
+    /// The newest action until the thread of the port takes it.
     action: Option<FineTargets>,
-    /// Actions that were replaced here.
+    /// Actions that newer ones replaced before the thread of the port took them.
     skipped: u32,
     /// The counts of the sender.
     counts: LatestCounts,
@@ -31,7 +31,7 @@ impl Slot {
     }
 }
 
-/// What a program is told that offered an action.
+/// The answer to a program that offers an action.
 pub(crate) struct Told {
     pub(crate) counts: LatestCounts,
     /// Where the actions so far lead, in degrees.
@@ -53,12 +53,13 @@ impl LatestSlot {
         self.slot().is_open = false;
     }
 
-    /// Is this the open stream?
+    /// Is the stream of this slot open?
     pub(crate) fn is_open(&self) -> bool {
         self.slot().is_open
     }
 
-    /// Offers an action, which replaces one that still waits. `None`: no stream is open. After a failure it is not taken.
+    /// Offers an action, which replaces one that still waits. `None`: no stream is open. After a failure it returns the failure,
+    /// and drops the action.
     pub(crate) fn offer(&self, action: &FineTargets) -> Option<Result<Told, MoveError>> {
         let mut slot = self.slot();
         if !slot.is_open {
@@ -89,14 +90,14 @@ impl LatestSlot {
         self.slot().action
     }
 
-    /// Tells the program what became of its actions.
+    /// Sets the counts and the failure that the program gets at its next action. An older failure stays if there is no new one.
     pub(crate) fn tell(&self, counts: LatestCounts, failed: Option<MoveError>) {
         let mut slot = self.slot();
         slot.counts = counts;
         slot.failed = failed.or(slot.failed.take());
     }
 
-    /// Takes the failure that the program was not told of yet.
+    /// Takes the failure that the program has not received yet.
     pub(crate) fn take_failure(&self) -> Option<MoveError> {
         self.slot().failed.take()
     }

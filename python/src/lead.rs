@@ -17,11 +17,11 @@ use sevenbot::stream::LatestStep;
 
 use crate::watch::{Inbox, PacedStream, Watch};
 
-/// The longest time between two looks at the arm and its watchdog.
+/// The longest time between two checks of the arm and its watchdog.
 const LOOK_PERIOD: Duration = Duration::from_millis(20);
 
 impl PacedStream<'_> {
-    /// Sends what is due, and tells the program what became of its actions.
+    /// Sends the points that are due, and sets the counts and the failure for the program.
     pub(crate) fn lead(&mut self, inbox: &Inbox) {
         let led = self.send_what_is_due(inbox);
         if led.as_ref().is_err_and(ends_leading) {
@@ -55,7 +55,8 @@ impl PacedStream<'_> {
         Ok(())
     }
 
-    /// After a failure of the whole arm the next point is a first one. A stop, and a first point that is far away, are not such failures.
+    /// Notes a failure of the whole arm, after which the next point is a first one. A stop and a first point that is far away are
+    /// not such failures.
     pub(crate) fn note_failure<T>(&mut self, done: &Result<T, MoveError>) {
         let is_of_arm = |failure: &MoveError| {
             !matches!(failure, MoveError::Interrupted | MoveError::StartTooFar(_)) && ends_leading(failure)
@@ -63,7 +64,7 @@ impl PacedStream<'_> {
         self.has_failed |= done.as_ref().is_err_and(is_of_arm);
     }
 
-    /// After `Arm.stop` nothing is sent until the program was told.
+    /// After `Arm.stop` nothing is sent until the program has received `Interrupted`.
     fn notice_stops(&mut self) -> Result<(), MoveError> {
         let stops = self.stops.load(Ordering::Relaxed);
         let is_stopped = std::mem::replace(&mut self.stops_before, stops) != stops;
@@ -86,7 +87,7 @@ impl PacedStream<'_> {
             self.approach(&first, &mut watch)?;
             self.first.take(point);
             if self.slot.waiting().is_some_and(|newer| is_far(&newer, point)) {
-                // The program went on meanwhile: no leap to where it is now.
+                // The program went on during the approach, so its newest action is approached, too.
                 self.first = FirstPoints::default();
             }
             let now = self.elapsed();
@@ -95,7 +96,7 @@ impl PacedStream<'_> {
         Ok(self.stream.send(point)?)
     }
 
-    /// Has the watchdog of the arm acted? Then the next action is a first one again.
+    /// Checks whether the watchdog of the arm has acted. If so, the next action is a first one again.
     fn ask_watchdog(&mut self) -> Result<(), MoveError> {
         let status = self.stream.arm().status()?;
         let has_acted = status.is_some_and(|status| status.faults() & fault::HOST_SILENT != 0);
@@ -136,7 +137,7 @@ impl PacedStream<'_> {
         }
     }
 
-    /// How long the thread may wait for a call; `None`: as long as it likes, as for an arm in virtual time.
+    /// How long the thread may wait for a call; `None`: without a limit, as for an arm in virtual time.
     pub(crate) fn wakes_in(&mut self) -> Option<Duration> {
         let at = self.wakes_at().filter(|_| self.simulation.is_none())?;
         Some(at.saturating_sub(self.elapsed()))

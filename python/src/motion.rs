@@ -18,11 +18,11 @@ use crate::arguments::{LINE_SPEEDS, LinePace};
 use crate::errors::StraightMoveError;
 use crate::watch::Watch;
 
-/// The longest time between two questions whether the call goes on.
+/// The longest time between two checks whether the call goes on.
 const POLL_PERIOD: Duration = Duration::from_millis(20);
 /// As [`POLL_PERIOD`], for a caller that sleeps on the clock of the arm.
 const SLEEP_PERIOD: Duration = Duration::from_millis(20);
-/// The tip stays on a line that is shorter than this, in millimetres.
+/// On a shorter line the tip counts as not moving, in millimetres.
 const SHORTEST_LINE: f64 = 0.5;
 
 /// Where the tip shall go.
@@ -33,7 +33,7 @@ pub(crate) struct TipWish {
     pub(crate) guard: Option<Guard>,
 }
 
-/// The measured angles in degrees. Fails if a servo is silent: its angle is that of before.
+/// The measured angles in degrees. Fails if a servo is silent, because its angle is out of date.
 pub(crate) fn known_angles(arm: &mut Arm) -> Result<[f64; 7], MoveError> {
     let angles = angles(arm)?;
     MoveCheck::of_positions(arm).check(arm)?;
@@ -65,7 +65,7 @@ pub(crate) fn finish(arm: &mut Arm, sent: &JointMove, watch: &mut Watch<'_>) -> 
     Ok(angles(arm)?)
 }
 
-/// Parks the arm in this pose, or in the kept one, or in the standard one. The inner error is that of the file of kept poses.
+/// Parks the arm in this pose, or in the kept one, or in the standard one. The inner error concerns the file of kept poses.
 pub(crate) fn park(
     arm: &mut Arm,
     pose: Option<FineTargets>,
@@ -92,7 +92,7 @@ pub(crate) fn park(
     }
 }
 
-/// What the guard says of the way of the joints to these targets: `None` where it allows it.
+/// The breach of the guard on the way of the joints to these targets; `None` if the guard allows the way.
 pub(crate) fn breach_on_way(
     arm: &mut Arm,
     targets: &FineTargets,
@@ -123,7 +123,7 @@ pub(crate) fn straight_line(
     Ok(StraightLine::plan(&StraightLineRequest { guard, ..line })?.recording)
 }
 
-/// The speed of the tip, in mm/s, that takes it there in this time. A tip that stays has none: the tool alone turns.
+/// The speed of the tip, in mm/s, that takes it there in this time; the lowest speed if only the tool turns.
 fn speed_within(start: LineStart, tip: Vector, seconds: f64) -> Result<f64, StraightMoveError> {
     let from = TipPose::of_fine(start.targets).tip;
     let length = (tip.x - from.x).hypot(tip.y - from.y).hypot(tip.z - from.z);
@@ -156,8 +156,8 @@ fn sleep_until(arm: &mut Arm, end: Instant, watch: &mut Watch<'_>) -> Result<(),
     }
 }
 
-/// Makes the arm hold if a joint moves, or may move because its servo is silent. The maker's firmware does not tell, so it always
-/// holds.
+/// Makes the arm hold if a joint moves, or may move because its servo is silent. The maker's firmware does not report this, so
+/// an arm with it always holds.
 pub(crate) fn hold_if_moving(arm: &mut Arm) -> Result<(), MoveError> {
     let is_moving = arm.status()?.is_none_or(|status| status.moving() != 0 || status.missing() != 0);
     if is_moving {
@@ -236,7 +236,7 @@ fn record_into(
     }
     let content = arm.exact_positions()?;
     let recorded = arm.with_reports(hz, content, |arm| {
-        // A restart would drive the joints of an arm that is to be guided.
+        // After a restart the motors drive the joints, so a hand cannot guide the arm.
         if arm.joints()?.has_restarted_since(&before) {
             return Err(MoveError::Problems(vec![Problem::of_arm(ProblemKind::Restarted)]));
         }

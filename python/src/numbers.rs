@@ -11,7 +11,7 @@ use crate::errors::{InvalidType, InvalidValue};
 /// Seven angles.
 pub(crate) type Angles = (f64, f64, f64, f64, f64, f64, f64);
 
-/// Much more than a recording has.
+/// The most rows that are read: many more than a recording has.
 const MOST_ROWS: usize = 10_000_000;
 
 /// The elements of a list, a tuple, an array or another ordered collection, at most one more than `most`. `None` for
@@ -77,7 +77,7 @@ impl<'py> FromPyObject<'_, 'py> for Values {
     }
 }
 
-/// A whole number. One that is too great for every register stays so.
+/// A whole number. One outside the range of `i32` becomes `i32::MAX`, which no register takes.
 fn whole(number: &Bound<'_, PyAny>) -> Option<i32> {
     let index = number.call_method0("__index__").ok()?;
     Some(index.extract().unwrap_or(i32::MAX))

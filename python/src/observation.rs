@@ -27,7 +27,7 @@ pub(crate) struct Observation {
 #[derive(Clone, Copy)]
 enum Monotonic {
     Instant(Instant),
-    /// Of a copy that `pickle` made: the seconds of the process that measured.
+    /// In a copy that `pickle` made: the seconds on the clock of the process that measured.
     Seconds(f64),
 }
 
@@ -38,7 +38,7 @@ type Pickled = (Angles, Angles, Angles, f64, f64, f64);
 const CYCLE: f64 = 0.01;
 
 impl Observation {
-    /// Reads it; `None` if the firmware does not tell.
+    /// Reads an observation; `None` if the firmware does not have these registers.
     pub(crate) fn read(arm: &mut Arm) -> Result<Option<Self>, Error> {
         let before = arm.elapsed();
         let Some(state) = arm.fine_state_if_served()? else { return Ok(None) };

@@ -15,7 +15,7 @@ use crate::errors::not_opened;
 use crate::registers::readable_names;
 use crate::worker::{SIGNAL_PERIOD, Worker};
 
-/// What an arm says of itself when it is opened.
+/// Facts that are read from an arm when it is opened.
 pub(crate) struct Opened {
     pub(crate) port: String,
     pub(crate) firmware: String,
@@ -37,7 +37,7 @@ impl Opened {
     }
 }
 
-/// Opens a port. A signal of Python ends it. A server may want a token.
+/// Opens a port. A signal of Python ends the opening. `token` is for a server that demands one.
 pub(crate) fn port(
     py: Python<'_>,
     port: &str,

@@ -11,7 +11,7 @@ const MOST_ARMS: usize = 8_192;
 /// The open arms of this process.
 static OPEN_ARMS: AtomicUsize = AtomicUsize::new(0);
 
-/// One of the threads that a process may have.
+/// The right to one of these arms. Dropping it frees the place.
 pub(crate) struct Place;
 
 impl Place {

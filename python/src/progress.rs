@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressDrawTarget};
 
-/// Shorter calls show nothing.
+/// Calls of [`ProgressLine::show`] until the bar appears, so that short calls show nothing.
 const DELAY_CALLS: u32 = 10;
 /// Redraws per second.
 const REDRAW_HZ: u8 = 10;
@@ -17,7 +17,7 @@ pub(crate) struct ProgressLine {
 }
 
 impl ProgressLine {
-    /// Shows how much of a call is done. A total of 0 is not known yet. Called each 50 ms.
+    /// Shows how much of a call is done. `total` is 0 while it is unknown. Is called each 50 ms.
     pub(crate) fn show(&mut self, done: u64, total: u64) {
         self.calls = self.calls.saturating_add(1);
         if total == 0 || self.calls < DELAY_CALLS {

@@ -213,7 +213,7 @@ impl Recording {
 }
 
 impl Recording {
-    /// The moments from a start on, each this many further than the one before. Backwards there is no time.
+    /// The first `length` of every `step`-th moment from `start` on. Fails for a negative step, because time goes forward.
     fn part(&self, py: Python<'_>, (start, step): (isize, isize), length: usize) -> PyResult<Self> {
         let (Ok(start), Ok(step @ 1..)) = (usize::try_from(start), usize::try_from(step)) else {
             return Err(InvalidValue::raise(py, "a part of a recording goes forward: use a positive step"));
@@ -227,7 +227,7 @@ impl Recording {
     }
 }
 
-/// On or off, of numbers or truths.
+/// Converts numbers or truth values to on or off.
 fn switches(py: Python<'_>, vacuum: &Bound<'_, PyAny>) -> PyResult<Vec<bool>> {
     let wrong = || InvalidType::raise(py, "vacuum is a list or an array of truths");
     let each = elements(vacuum, usize::MAX)?.ok_or_else(wrong)?;

@@ -68,7 +68,7 @@ pub(crate) fn set(
     warn_of_silent(py, raised::<_, MoveError>(py, written)?)
 }
 
-/// Without an answer it is unknown whether a motor is off.
+/// Warns of servos that did not answer when the motors were switched off: it is unknown whether theirs are off.
 fn warn_of_silent(py: Python<'_>, silent: u8) -> PyResult<()> {
     if silent == 0 {
         return Ok(());

@@ -20,7 +20,7 @@ use crate::errors::{Closed, InvalidValue, without_attribute};
 use crate::numbers::{Angles, duration};
 use crate::worker::lock;
 
-/// Virtual time between two checks of Python's signals: some ten milliseconds of a processor.
+/// Virtual time between two checks of Python's signals. It takes some tens of milliseconds of processor time.
 const ADVANCE_SLICE: Duration = Duration::from_secs(20);
 
 /// The simulated arm of `Arm.simulated()`.
@@ -31,7 +31,7 @@ const ADVANCE_SLICE: Duration = Duration::from_secs(20);
 #[derive(Clone)]
 pub(crate) struct Simulation {
     shared: SharedSimulation,
-    /// A forked process has a copy, whose lock may be held for ever.
+    /// The process that made the simulation. A forked process has a copy, whose lock may be held for ever.
     process: u32,
 }
 

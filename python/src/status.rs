@@ -18,7 +18,7 @@ use crate::tip::html_table;
 pub(crate) struct Status {
     block: StatusBlock,
     health: Health,
-    /// Registers 0 to 255, of which the rest is made.
+    /// Registers 0 to 255, from which the other fields are computed.
     registers: Vec<u8>,
 }
 

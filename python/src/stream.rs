@@ -20,7 +20,7 @@ use crate::stream_counts::StreamCounts;
 use crate::watch::{PacedStream, StreamOrder, Watch};
 use crate::worker::{Worker, lock};
 
-/// The longest time between two frames while a point is not due yet: a watchdog of 10 ms needs more than this.
+/// The longest time between two frames while a point is not due yet. It is too long for a watchdog of 10 ms.
 const SLICE: Duration = Duration::from_millis(20);
 
 /// A stream of set-points, a context manager: `with arm.stream(0.02) as stream: stream.send(...)`.
@@ -33,7 +33,7 @@ pub(crate) struct Stream {
     worker: Arc<Worker>,
     options: StreamOptions,
     rule: ApproachRule,
-    /// `None` after the first warning, too.
+    /// `None` without a guard, and after the first warning.
     guard: Mutex<Option<Guard>>,
     /// `None` for a real arm.
     simulation: Option<SharedSimulation>,
@@ -78,8 +78,8 @@ impl Stream {
 }
 
 impl PacedStream<'_> {
-    /// Waits until the joints stand at their last points. After a failure of the whole arm they will not get there: tells only a
-    /// program that does not know yet.
+    /// Waits until the joints stand at their last points. After a failure of the whole arm they do not get there: then it returns
+    /// only a failure that the program has not received yet.
     fn arrive(&mut self, watch: &mut Watch<'_>) -> Result<(), MoveError> {
         self.finish_leading(watch)?;
         if self.has_failed {
@@ -91,7 +91,8 @@ impl PacedStream<'_> {
         self.stream.wait_until_arrived(|stream, end| stream.wait_until(end, watch))
     }
 
-    /// After a restore, and after a failure of the whole arm, the arm may be elsewhere, and may not know of the stream.
+    /// Begins the stream again after a restore and after a failure of the whole arm. The arm may be elsewhere then, and may have
+    /// lost the registers of the stream.
     pub(crate) fn begin_again_if_lost(&mut self) -> Result<(), StreamError> {
         let restores = self.simulation.as_ref().map_or(0, SharedSimulation::restores);
         if self.restores != restores || self.has_failed {

@@ -33,7 +33,7 @@ pub(crate) struct PacedStream<'a> {
     pub(crate) pace: StreamPace,
     pub(crate) first: FirstPoints,
     pub(crate) rule: ApproachRule,
-    /// The last point of each joint in degrees, and the target at the start where it had none.
+    /// The last point of each joint in degrees; for a joint without a point, its target at the start.
     pub(crate) pose: [f64; 7],
     /// The points of a program that does not wait, and what it offers.
     pub(crate) points: LatestPoints,
@@ -42,11 +42,11 @@ pub(crate) struct PacedStream<'a> {
     pub(crate) is_held: bool,
     /// The whole arm has failed since the last point: the next one is a first one.
     pub(crate) has_failed: bool,
-    /// How often the arm was stopped by now, and at the last look.
+    /// How often the arm has been stopped until now, and until the last check.
     pub(crate) stops: Arc<AtomicU64>,
     pub(crate) stops_before: u64,
     pub(crate) simulation: Option<SharedSimulation>,
-    /// How often the simulated arm was restored by the last look.
+    /// How often the simulated arm had been restored at the last check.
     pub(crate) restores: u64,
 }
 
@@ -105,7 +105,7 @@ pub(crate) enum Message {
     StreamCall(StreamCall),
     /// Runs also if its caller has left.
     CloseStream(Arc<CallState>, StreamResult),
-    /// Look what is due. An arm in virtual time looks while its time passes.
+    /// Send the points that are due. An arm in virtual time ignores this: it sends them while its time passes.
     Wake,
 }
 
@@ -140,7 +140,7 @@ impl CallState {
         self.is_interrupted.store(true, Ordering::Relaxed);
     }
 
-    /// How much is done, and of how much.
+    /// The work done so far, and all of it.
     pub(crate) fn progress(&self) -> (u64, u64) {
         (self.done.load(Ordering::Relaxed), self.total.load(Ordering::Relaxed))
     }
@@ -197,14 +197,14 @@ impl Inbox {
     }
 }
 
-/// The end of a [`CallState`] in the thread of the port.
+/// A [`CallState`] as the thread of the port uses it.
 pub(crate) struct Watch<'a> {
     pub(crate) state: Arc<CallState>,
     pub(crate) inbox: &'a Inbox,
 }
 
 impl<'a> Watch<'a> {
-    /// For work that no call waits for. A stop from now on ends it.
+    /// For work that no call waits for. A stop after this ends the work.
     pub(crate) fn of_no_call(stops: &Arc<AtomicU64>, inbox: &'a Inbox) -> Self {
         Self { state: Arc::new(CallState::new(stops)), inbox }
     }

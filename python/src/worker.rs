@@ -42,7 +42,7 @@ pub(crate) struct Worker {
     open: Mutex<Option<Port>>,
     /// How often [`Self::interrupt`] was called.
     stops: Arc<AtomicU64>,
-    /// The process of the thread. A forked process does not have it.
+    /// The process of the thread. A forked process does not have the thread.
     process: u32,
     shows_progress: AtomicBool,
 }
@@ -155,7 +155,7 @@ impl Worker {
         signal.map_or(Ok(slept), Err)
     }
 
-    /// Lets the thread of the port see what is due. Does not wait.
+    /// Makes the thread of the port send the points that are due. Does not wait.
     pub(crate) fn wake(&self, py: Python<'_>) -> PyResult<()> {
         self.send(py, Message::Wake)
     }
@@ -252,7 +252,7 @@ impl Worker {
 impl Drop for Worker {
     fn drop(&mut self) {
         if self.is_forked() {
-            // The thread is not there, and it may have held the locks of the channel.
+            // A forked process lacks the thread, which may have held the locks of the channel.
             let open = self.open.get_mut().unwrap_or_else(PoisonError::into_inner);
             std::mem::forget(open.take());
         }
@@ -266,9 +266,9 @@ fn finish(py: Python<'_>, (result, signal): (Result<(), StreamError>, Option<PyE
 
 /// What a signal of Python does to a wait.
 enum Wait<'a> {
-    /// It interrupts the call, whose result follows at once. From a call that waits for another one, the caller leaves.
+    /// It interrupts the call, whose result follows soon. If the call has not begun yet, its caller leaves.
     ToTheEnd { shows_progress: bool },
-    /// The caller leaves, and sets this.
+    /// The caller leaves, and sets this flag.
     AtMostUntilSignal(&'a AtomicBool),
 }
 
@@ -354,7 +354,7 @@ fn serve_stream(mut stream: PacedStream<'_>, inbox: &Inbox) {
     }
 }
 
-/// A panic while the lock is held leaves nothing half done.
+/// Locks a mutex, even if a thread panicked while it held the lock: no value is left half changed.
 pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

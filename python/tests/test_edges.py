@@ -411,7 +411,7 @@ def test_an_arm_can_be_read_while_another_thread_waits_for_it(simulated_arm: sev
     thread = threading.Thread(target=wave)
     thread.start()
     try:
-        # Calls of single moves would show the ends of the way only.
+        # Only a read during the call shows an angle between the ends of the way.
         while not 60 < simulated_arm.angles[0] < 85:
             pass
         assert simulated_arm.get("speed.1") == 1

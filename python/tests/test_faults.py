@@ -31,7 +31,7 @@ AFTERWARDS = 3.0
 #: The arm has received this many frames before. A method detects a restart by the counter of frames.
 USED = 100
 
-#: The words for a supply that is lost and comes back: which ones depends on when the method reads the arm.
+#: The messages for a supply that is lost and comes back. Which one appears depends on when the method reads the arm.
 SUPPLY_WORDS = ["no servo answers", "does not answer", "let go", "lost their supply"]
 
 Angles = tuple[float, ...]
@@ -248,7 +248,7 @@ FAULTS = [
 def registers_of(arm: sevenbot.Arm) -> dict[str, object] | None:
     """The registers that are looked at. The arm may be closed or gone."""
     try:
-        # First what the arm changes by itself when it notices a fault.
+        # First the targets, which the arm changes by itself when it notices a fault.
         positions = enumerate(arm.get("target-position"), start=1)
         found: dict[str, object] = {f"target-position.{joint}": degrees for joint, degrees in positions}
         for name in ["motor-state", "vacuum-pump", "speed.2", "offset.1"]:

@@ -306,7 +306,7 @@ def test_after_a_failure_of_the_whole_arm_the_next_point_is_a_first_one(
             send([here[0] + 50, *here[1:]])
         send(here)
         assert simulated_arm.get("set-point-period") == 20 and simulated_arm.get("host-watchdog") == 30
-        # The program knows of it, so the end of the stream does not tell it again.
+        # The program has received the failure, so the end of the stream does not raise it again.
         fail(simulated_arm)
         with pytest.raises(failure):
             send(here)

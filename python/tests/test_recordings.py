@@ -92,7 +92,7 @@ def test_a_cut_file_is_read_as_far_as_it_goes(file: Path, kept: float) -> None:
     with pytest.raises(sevenbot.BadRecording, match="the file ends in the middle; [1-9]") as refused:
         sevenbot.Recording.load(cut)
     assert "sevenbot convert" in refused.value.hints[0]
-    # What another reader finds in it.
+    # The messages that another reader finds in the cut file.
     topics, moments = {}, 0
     with cut.open("rb") as stream:
         try:

@@ -91,7 +91,7 @@ class Start:
     def emulator(self) -> Program:
         """The image for the arm in an emulator behind the link, ready."""
         emulator = self.program([os.environ["XTASK"], "emulate", "--no-build", "--link", self.link])
-        # A process that has its own, such as the emulator, ends those when it is terminated.
+        # The emulator has child processes, which it ends when it is terminated.
         self._stack.callback(lambda: emulator.end(signal.SIGTERM))
         emulator.line()
         return emulator

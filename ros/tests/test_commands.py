@@ -183,5 +183,5 @@ def test_a_warning_passes_once_in_a_period_and_the_rest_is_counted() -> None:
     passed = [throttle.pass_("NaN", time / 100) for time in range(1000)]
     assert [(index, held) for index, held in enumerate(passed) if held is not None] == [(0, 0), (500, 499)]
     assert throttle.pass_("old", 0.0) == 0
-    # A simulated clock that starts again lets it pass.
+    # After a restart of a simulated clock, the warning passes.
     assert throttle.pass_("NaN", 0.0) is not None

@@ -134,7 +134,7 @@ def test_a_stop_between_the_check_and_the_motion_ends_the_motion(start: Start, m
 
 
 def test_a_stop_whose_servo_answers_late_names_it_and_makes_the_arm_hold() -> None:
-    # As servos in an emulator on a busy machine: they do what they are told, but the arm does not hear them.
+    # As with servos in an emulator on a busy machine: they obey, but their answers come too late for the arm.
     with running(jump=Jump.APPROACH) as (driver, heard):
         simulation = driver.arm().simulation
         assert isinstance(simulation, sevenbot.Simulation)
@@ -163,7 +163,7 @@ def test_a_hold_on_the_way_home_does_not_count_as_home() -> None:
     with running(real_time_factor=0.5) as (driver, heard):
         with driver.action() as arm:
             arm.pose(150, None, None, None, None, None, None)
-        # Else a measurement from before the pose may stand for the way home.
+        # Otherwise a measurement from before the pose could be taken for the way home.
         heard.until(lambda: heard.last is not None and heard.last.positions[0] > 149.0)
         raised: list[Exception] = []
 
@@ -199,7 +199,7 @@ def test_a_command_that_comes_while_the_arm_is_lost_does_not_lead_the_next_one()
 
     def close() -> None:
         if driver.streamer.is_open:
-            # Another thread hears a command while the stream of the lost arm is closed.
+            # Imitates another thread, which receives a command while the stream of the lost arm is closed.
             answers.append(driver.leads.command(Targets({0: 94.0})))
         close_stream()
 

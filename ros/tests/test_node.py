@@ -136,7 +136,7 @@ def test_a_killed_node_leaves_the_arm_to_its_watchdog(start: Start, client: Clie
             break
         # Servos miss answers on a busy machine, and the node made the arm hold before it was killed.
         controller.end(signal.SIGTERM)
-    # A program that asks the arm would end the silence.
+    # Wait without a connection: a program that asks the arm would end the silence.
     time.sleep(1.0)
     arm = sevenbot.Arm(start.link)
     # Bit 6 of the faults: the watchdog of the host acted.
@@ -227,7 +227,7 @@ def test_a_signal_ends_the_program_without_a_complaint(start: Start, client: Cli
     # The signal comes at any point of the cycle of the arm's thread.
     for _ in range(3):
         node = start.node(rate=200)
-        # What the node says, because a state may be one of the node before.
+        # Wait for text of this node, because a state may come from the previous node.
         hearing.until(lambda node=node: "answers at" in node.text(), "arm")
         assert node.end(how) == 0, node.text()
         assert not any(word in node.text() for word in ("Traceback", "Exception", "ERROR")), node.text()
@@ -247,7 +247,7 @@ def test_memory_does_not_grow(start: Start, client: Clients, report: Report) -> 
             leading.spin(0.02)
             del leading.states[:-1], leading.joint_states[:-1], leading.tips[:-1], leading.diagnostics[:-1]
 
-    # A pool of the middleware or of Python grows by a step, and rests: a leak grows in every stretch of time.
+    # A memory pool of the middleware or of Python grows once and then keeps its size. A leak grows in every period.
     kilobytes: list[int] = []
     while len(kilobytes) < 2 or kilobytes[-1] - kilobytes[-2] > 256 + 4 * seconds:
         assert len(kilobytes) < 6, f"the memory of the node grows: {kilobytes} kB"

@@ -137,7 +137,7 @@ def test_the_claw_has_an_action_of_its_own(start: Start, client: Clients) -> Non
     leading.until(lambda: arm.server_is_ready() and claw.server_is_ready(), "the actions")
     assert result(leading, goal(leading, claw, 4, [])) == (6, -2)
     assert "this controller has no joint joint_1" in node.text()
-    # A trajectory of the arm ends at its end, not by one of the claw.
+    # A trajectory of the claw does not end one of the arm.
     way = goal(leading, arm, 4, [])
     leading.until(lambda: leading.degrees()[2] < -5.0, "motion of the arm")
     assert result(leading, goal(leading, claw, 5, [])) == (6, -1)

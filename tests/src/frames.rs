@@ -58,7 +58,7 @@ pub struct FrameSplitter {
 }
 
 impl FrameSplitter {
-    /// For the bytes of an arm, or else those of a program.
+    /// For the bytes of an arm if `is_of_arm`, otherwise for those of a program.
     #[must_use]
     pub const fn new(is_of_arm: bool) -> Self {
         Self { bytes: Vec::new(), is_of_arm, count: 0 }
@@ -69,7 +69,7 @@ impl FrameSplitter {
         self.bytes.extend(bytes);
     }
 
-    /// Frames so far.
+    /// The number of frames that [`Self::next`] has returned, without bytes outside frames.
     #[must_use]
     pub const fn count(&self) -> u32 {
         self.count

@@ -27,7 +27,7 @@ impl RunningProgram {
     #[must_use]
     pub fn spawn(command: &mut Command) -> Self {
         let child = command.spawn().unwrap_or_else(|error| panic!("{command:?}: {error}"));
-        // The emulator has servos and a machine.
+        // `xtask emulate` starts the servos and the emulator as processes of its own.
         let has_processes = Path::new(command.get_program()).ends_with("xtask");
         Self { child: Some(child), has_processes }
     }

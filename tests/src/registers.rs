@@ -1,4 +1,4 @@
-//! Register addresses, written from `docs/protocol.md`, sections 3 to 6.
+//! Register addresses, written from `docs/protocol.md`, sections 4 to 6, 9 and 10.
 
 /// Device code, the first register of the ROM.
 pub const DEVICE_CODE: u8 = 0;

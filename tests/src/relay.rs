@@ -24,7 +24,7 @@ use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 use crate::frames::{FrameSplitter, is_target};
 use crate::wait::wait_for;
 
-/// The longest time until the relay notices its end, in nanoseconds.
+/// The longest time until the relay notices that it has to end, in nanoseconds.
 const POLL_NANOS: i64 = 20_000_000;
 
 /// A frame on the line. The action comes before the frame is passed on.
@@ -41,18 +41,18 @@ pub enum Moment {
 /// What the action of the test does to the line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LineAction {
-    /// Nothing.
+    /// The relay passes frames on.
     Nothing,
-    /// It is unplugged.
+    /// The relay closes both ends, as when a cable is unplugged.
     Unplug,
 }
 
 /// A frame on the line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Passing<'a> {
-    /// Of the program.
+    /// From the program to the arm.
     Request(&'a [u8]),
-    /// Of the arm.
+    /// From the arm to the program.
     Reply(&'a [u8]),
 }
 
@@ -65,11 +65,11 @@ pub struct RelayPlan {
     pub moment: Moment,
     /// The action.
     pub action: Box<dyn FnMut() -> LineAction + Send>,
-    /// Do about a tenth of the frames of each direction have a wrong checksum? Never three questions or answers in a row.
+    /// Do about a tenth of the frames of each direction get a wrong checksum? Three tries of a read in a row never fail.
     pub is_noisy: bool,
 }
 
-/// A port for a program, as long as it lives.
+/// A port for a program. It exists until this value is dropped.
 pub struct Relay {
     path: PathBuf,
     /// Keeps the raw mode while no program has the port open.
@@ -85,7 +85,7 @@ impl Relay {
         Self::open_with(port, plan, Box::new(|_| ()))
     }
 
-    /// Opens a port that leads to the arm at `port`, and shows each frame.
+    /// Opens a port that leads to the arm at `port`, and shows each frame to `watch`.
     #[must_use]
     pub fn open_watched(port: &Path, watch: Watch) -> Self {
         let plan = RelayPlan {
@@ -166,13 +166,13 @@ struct Line {
     plan: RelayPlan,
     watch: Watch,
     has_acted: bool,
-    /// Reports and other frames of the arm on a noisy line.
+    /// The number of reports from the arm on a noisy line. `answers` counts the arm's other frames.
     reports: u32,
     answers: u32,
 }
 
 impl Line {
-    /// Passes bytes on until the test ends it or the action unplugs it. Returns whether the action took place.
+    /// Passes bytes on until the test ends the relay or the action unplugs the line. Returns whether the action took place.
     fn run(mut self) -> bool {
         while !self.is_over.load(Ordering::SeqCst) && self.pass_bytes() == LineAction::Nothing {}
         self.has_acted
@@ -227,7 +227,8 @@ impl Line {
             return LineAction::Unplug;
         }
         if self.plan.is_noisy {
-            // Reports come so regularly that they would shield the answers, or have them hit each time.
+            // Reports and answers have separate counters. With one counter, regular reports could make each answer the one that
+            // is disturbed, or no answer at all.
             let (count, each) =
                 if is_report(&frame) { (&mut self.reports, 9) } else { (&mut self.answers, 7) };
             *count += 1;
@@ -252,7 +253,7 @@ fn read(source: &OwnedFd, splitter: &mut FrameSplitter) {
     splitter.push(&chunk[..length]);
 }
 
-/// Writes a frame. An arm that takes no bytes for a second, or is gone, is a fault that a test wants.
+/// Writes a frame. Gives up without an error if the arm takes no bytes for a second or is gone: a test may cause this.
 fn pass_on(arm: &OwnedFd, frame: &[u8]) {
     let mut rest = frame;
     while !rest.is_empty() {

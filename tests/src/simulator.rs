@@ -11,7 +11,7 @@ use crate::ArmClient;
 use crate::process::{self, RunningProgram};
 use crate::programs::{host_sim, tool};
 
-/// A simulator, and its folder for everything.
+/// A running simulator, and a temporary folder for its sockets and the files of a test.
 #[derive(Debug)]
 pub struct Simulator {
     /// Its process.
@@ -59,7 +59,7 @@ impl Simulator {
         tool.arg("sim").args(arguments).output().expect("sevenbot runs")
     }
 
-    /// What a command prints that succeeds.
+    /// Runs `sevenbot sim`, which must succeed. Returns its standard output.
     #[track_caller]
     pub fn says(&self, arguments: &[&str]) -> String {
         let output = self.sim(arguments);
@@ -67,7 +67,7 @@ impl Simulator {
         String::from_utf8(output.stdout).expect("text")
     }
 
-    /// What a command prints that fails with this exit status.
+    /// Runs `sevenbot sim`, which must fail with this exit status. Returns its standard error.
     #[track_caller]
     pub fn refuses(&self, arguments: &[&str], status: i32) -> String {
         let output = self.sim(arguments);
@@ -75,7 +75,7 @@ impl Simulator {
         String::from_utf8(output.stderr).expect("text")
     }
 
-    /// The true state of the arm.
+    /// The state of the arm as the simulator knows it, not as the controller measured it.
     #[must_use]
     pub fn state(&self) -> Value {
         serde_json::from_str(&self.says(&["state", "--json"])).expect("JSON")

@@ -19,7 +19,7 @@ use crate::wait::wait_for;
 const ROWS: NonZeroU16 = NonZeroU16::new(24).unwrap();
 const COLUMNS: NonZeroU16 = NonZeroU16::new(80).unwrap();
 
-/// A terminal and its program, which is killed with it.
+/// A terminal and its program, which is killed when the terminal is dropped.
 pub struct Terminal {
     pty: Arc<Pty>,
     screen: Arc<Mutex<Parser>>,

@@ -155,7 +155,7 @@ impl TestArm {
         self.control.lacks(need).is_none()
     }
 
-    /// Switches the arm off and on, and waits until it has started, with this baud rate.
+    /// Switches the arm off and on, opens its port at this baud rate, and waits until it has started.
     pub fn power_cycle(&mut self, baud: u32) {
         self.mark_ram();
         self.control.power_cycle();
@@ -259,15 +259,15 @@ impl TestArm {
         });
     }
 
-    /// Starts the command line tool on the port of this arm, without standard input. [`TestArm::reopen`] follows its end.
+    /// Starts the command line tool on the port of this arm, without standard input. After its end, call [`TestArm::reopen`].
     pub fn spawn_sevenbot(&mut self, arguments: &[&str]) -> RunningProgram {
         let mut tool = tool();
         tool.arg("--port").arg(self.lend_port()).args(arguments).stdin(Stdio::null());
         RunningProgram::spawn(tool.stdout(Stdio::piped()).stderr(Stdio::piped()))
     }
 
-    /// As [`Self::spawn_sevenbot`], and waits until the tool prints `text` on standard error: with `--verbose`, a frame for
-    /// example.
+    /// As [`Self::spawn_sevenbot`], and waits until the tool prints `text` on standard error, such as a frame with
+    /// `--verbose`.
     pub fn spawn_sevenbot_until(&mut self, arguments: &[&str], text: &str) -> RunningProgram {
         let mut tool = self.spawn_sevenbot(arguments);
         let mut stderr = tool.stderr.take().expect("a pipe");

@@ -18,10 +18,10 @@ use sha2::{Digest, Sha512};
 
 use crate::run::{TaskResult, root, target_directory};
 
-/// The name and the version that the licences tell.
+/// Name, version and licence, for the list of licences of a release.
 pub(crate) const NAME: &str = "Blockly 13.3.0 (npm): Apache-2.0";
 const URL: &str = "https://registry.npmjs.org/blockly/-/blockly-13.3.0.tgz";
-/// The integrity that the registry tells for this version: SHA-512.
+/// The SHA-512 of this version in base64, as the registry publishes it.
 const INTEGRITY: &str =
     "qAHFGMGTSF67Lupr3pjZz9LQu4JCFdN76CMZxegBKiveZreK08yXhaCz0g9q9/xe5GEdoeFT3POAlQavPIRPEw==";
 const CORE: &str = "blockly_compressed.js";
@@ -35,7 +35,8 @@ const PICTURES: [(&str, &str); 3] = [
     ("handdelete.cur", "image/x-icon"),
     ("sprites.svg", "image/svg+xml"),
 ];
-/// How Blockly makes an element with styles. The policy of the page allows none, so the editor takes the text of another element.
+/// Blockly's code for a style element. The policy of the page forbids such elements, so the styles go into a template element,
+/// from which the editor reads them.
 const STYLE: &str = "createElement(\"style\")";
 const STYLE_TEXT: &str = "createElement(\"template\")";
 
@@ -50,7 +51,7 @@ pub(crate) fn script() -> TaskResult<String> {
     script.push_str("\nvar blocklyTexts = {};\n");
     for (language, file) in TEXTS {
         let texts = package.text(file)?;
-        // The file adds to what it finds here.
+        // The file adds its texts to this `Blockly.Msg`.
         writeln!(
             script,
             "(function () {{ {texts} }}).call({{ Blockly: {{ Msg: blocklyTexts[\"{language}\"] = {{}} }} }});"

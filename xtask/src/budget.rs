@@ -49,7 +49,7 @@ impl Budget {
         let (name, committed, max) = (cells.next()?, cells.next()?, cells.next()?);
         let max = if max == "-" { None } else { Some(max.parse().ok()?) };
         let committed = if committed == VARIES { None } else { Some(committed.parse().ok()?) };
-        // Something has to be compared.
+        // A line with neither a committed value nor a limit is an error.
         committed.or(max)?;
         Some(Self { name: name.to_owned(), committed, max })
     }

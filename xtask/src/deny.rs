@@ -175,7 +175,7 @@ impl DenyRules {
         (!is_allowed).then(|| format!("source `{source}` is not allowed"))
     }
 
-    /// Our packages do not depend on any version of a crate.
+    /// Our packages must restrict the versions of their dependencies: `*` is forbidden.
     fn wildcard(&self, package: &Package) -> Option<String> {
         let is_exempt =
             |dependency: &&Dependency| dependency.path.is_some() && self.bans.allow_wildcard_paths;

@@ -20,9 +20,9 @@ use clap::Args;
 use crate::run::{TaskResult, empty_folder, root, run, target_directory};
 use crate::trials::Trials;
 
-/// The targets, and the number of inputs in the fixed form, for about 15 s of one processor. Measured in its time, inputs per
-/// second: `controller` 4,200, `deframer` 6,200, `host_reply` 3,900, `image_file` 1,900, `journal` 5,000, `register_ops`
-/// 144,000. The rate falls while a target finds new inputs.
+/// The targets, and the number of inputs in the fixed form, for about 15 s of one processor each. Measured inputs per second
+/// in this time: `controller` 4,200, `deframer` 6,200, `host_reply` 3,900, `image_file` 1,900, `journal` 5,000,
+/// `register_ops` 144,000. The rate falls while a target finds new inputs.
 const TARGETS: [(&str, u32); 6] = [
     ("controller", 60_000),
     ("deframer", 100_000),
@@ -80,7 +80,7 @@ pub(crate) fn all(seconds: u64, seed: u32, trials: &mut Trials) -> TaskResult {
     fuzz_all(seed, Some(seconds), trials)
 }
 
-/// Fuzzes as many targets at once as there are processors. Without `seconds`, in the fixed form.
+/// Fuzzes as many targets at once as there are processors. `seconds` is `None` for the fixed form.
 fn fuzz_all(seed: u32, seconds: Option<u64>, trials: &mut Trials) -> TaskResult {
     let programs = build()?;
     let at_once = available_parallelism().map_or(1, usize::from);

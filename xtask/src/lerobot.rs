@@ -32,7 +32,7 @@ pub(crate) fn check() -> TaskResult {
     run_command(&mut pytest(&python, &tests))
 }
 
-/// LeRobot's own commands with the plugin. Installs all of LeRobot at the first time.
+/// LeRobot's own commands with the plugin. The first run installs all of LeRobot.
 pub(crate) fn commands() -> TaskResult {
     let python = environment("lerobot-whole")?;
     if !python.with_file_name("lerobot-record").exists() {

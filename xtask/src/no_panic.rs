@@ -1,7 +1,7 @@
 //! `cargo xtask no-panic`: the cores, linked for the chip, and the firmware contain no reachable panic.
 //!
-//! The linker leaves out what nothing refers to. So if the panic handler, or anything of `core` that leads
-//! to it, is in the program, then some line can panic; which one, the debug information says.
+//! The linker leaves out what nothing refers to. So if the program contains the panic handler, or a function of `core` that
+//! leads to it, some line can panic. The debug information shows which one.
 
 use crate::run::{TaskResult, link};
 use linked_image::{Program, SourceLine, Symbol};

@@ -1,5 +1,5 @@
 //! `cargo xtask bench`: compares the parse-and-reply path with its peers: time on this machine; instructions and bytes on the
-//! chip. Other measurements are programs of `benchmarks/bench`. None has budgets; `count` and `size` have.
+//! chip. Other measurements are programs of `benchmarks/bench`. These measurements have no budgets, unlike `count` and `size`.
 
 use crate::count::{self, NamedCount};
 use crate::footprint;

@@ -29,7 +29,7 @@ pub(crate) const OLDEST: Version = (3, 10);
 /// Builds the wheel, and tests it with all interpreters on PATH.
 pub(crate) fn check() -> TaskResult {
     let wheel = wheel()?;
-    // Programs of blocks run on it.
+    // The tests of block programs run on the image in the emulator.
     emulator::need_qemu()?;
     build_image()?;
     for (version, program) in interpreters() {
@@ -73,7 +73,7 @@ fn environment((major, minor): Version, program: PathBuf) -> TaskResult<PathBuf>
     venv::with_packages(&folder().join(format!("{major}.{minor}")), || Ok(program), &PACKAGES)
 }
 
-/// The profile is that of the other tests, which builds quickly.
+/// Builds the wheel with the profile of the other tests, which compiles quickly.
 fn build_wheel(python: &Path) -> TaskResult<PathBuf> {
     let wheels = folder().join("wheels");
     empty_folder(&wheels)?;
@@ -84,8 +84,8 @@ fn build_wheel(python: &Path) -> TaskResult<PathBuf> {
     Ok(wheel.path())
 }
 
-/// Types and behaviour of the installed package. The folder of the sources is not the current one, so that it is not
-/// imported.
+/// Checks types and behaviour of the installed package. Runs outside the folder of the sources, so that Python does not
+/// import those.
 fn test(python: &Path, wheel: &Path) -> TaskResult {
     run_command(pip(python).args(["--force-reinstall", "--no-deps"]).arg(wheel))?;
     let module = |words: &[&str]| {
@@ -101,7 +101,7 @@ fn test(python: &Path, wheel: &Path) -> TaskResult {
     run_command(pytest(python, "python/tests").arg("--ignore").arg(root().join("python/tests/test_ray.py")))
 }
 
-/// pytest, with the programs of the step that built all of them.
+/// pytest, with the programs that the step "programs and tests" has built.
 fn pytest(python: &Path, tests: &str) -> Command {
     let mut command = Command::new(python);
     command.args(["-m", "pytest", "--quiet", "-p", "no:cacheprovider", "--config-file"]);

@@ -38,7 +38,7 @@ pub(crate) fn check() -> TaskResult {
     let python =
         venv::with_packages(&folder().join("venv"), || interpreter("ROS 2", (3, 10)..=(3, 13)), &PACKAGES)?;
     let wheel = wheel()?;
-    // Its name is another one, so that it is not imported.
+    // The copy has another name than the package, so that Python imports the installed package.
     let package = folder().join("package");
     copy_of(&root().join("ros/sevenbot_ros"), &package)?;
     run_command(pip(&python).args(["--force-reinstall", "--no-deps"]).args([&wheel, &package]))?;
@@ -71,7 +71,7 @@ fn test(python: &Path) -> TaskResult {
         .env("SEVENBOT", target_directory().join("debug/sevenbot"))
         .env("XTASK", env::current_exe()?)
         .env("ROS_LOG_DIR", folder().join("log"))
-        // Programs of the tests share it, and none of it is left beside the sources.
+        // The programs of the tests share this folder, and leave no bytecode beside the sources.
         .env("PYTHONPYCACHEPREFIX", folder().join("bytecode"))
         .current_dir(folder());
     run_command(&mut command)

@@ -42,7 +42,7 @@ fn stl(mesh: &Mesh) -> Vec<u8> {
     bytes
 }
 
-/// To micrometres, because the last digits of a sine depend on the platform. Adding 0 makes -0 to 0.
+/// Rounds to micrometres, because the last digits of a sine depend on the platform. Adding 0 turns -0 into 0.
 fn rounded(millimetres: f32) -> f32 {
     (millimetres * 1000.0).round() / 1000.0 + 0.0
 }

@@ -52,7 +52,7 @@ const WATCHDOG_STARTED: [RegisterAccess<'_>; 6] = [
     Read(WATCHDOG, 0x0C),
     Write(WATCHDOG, 0x00, 0xAAAA),
 ];
-/// Level 6, enabled.
+/// The supply monitor is enabled at level 6.
 const SUPPLY_WATCHED: RegisterAccess<'_> = Write("PWR", 0x00, 6 << 5 | 1 << 4);
 /// An erase starts. The data cache is reset after it.
 const ERASE: u32 = 1 << 16;

@@ -62,7 +62,7 @@ pub(crate) fn act_of(stages: &[Stage], heading: &str) -> TaskResult {
     outcome
 }
 
-/// Runs a step in a process of its own, because its output can only be kept apart there, and its processor time measured.
+/// Runs a step in a process of its own, so that its output can be kept apart and its processor time can be measured.
 /// `output` is `None` for our standard output.
 pub(crate) fn execute(step: &TestStep, output: Option<File>) -> (Times, TaskResult) {
     let start = Instant::now();

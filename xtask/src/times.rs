@@ -26,7 +26,7 @@ pub(crate) struct Times {
 }
 
 impl Times {
-    /// Does a piece of work of this process. Children count if they have ended and were waited for.
+    /// Runs `work` in this process, and measures it. Children count if they have ended and were waited for.
     pub(crate) fn of<T>(work: impl FnOnce() -> T) -> (Self, T) {
         let (start, before) = (Instant::now(), own_processor_time());
         let outcome = work();
@@ -62,7 +62,7 @@ pub(crate) fn adopt_orphans() -> TaskResult {
     Ok(())
 }
 
-/// Waits for the end of all processes that this one has started or adopted, but not for long.
+/// Waits for the end of all processes that this one has started or adopted, for [`PATIENCE`] at most.
 pub(crate) fn wait_for_orphans() {
     let deadline = Instant::now() + PATIENCE;
     while Instant::now() < deadline {

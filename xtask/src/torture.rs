@@ -40,7 +40,7 @@ pub(crate) fn long() -> TaskResult {
     days(30)
 }
 
-/// What runs beside the worlds depends on time, and they do not.
+/// Runs worlds at a low priority: the steps that run at the same time depend on real time, but the worlds do not.
 fn days(days: u32) -> TaskResult {
     let worlds = format!("--days {days} --seed 1 --frames 0 --motions 200");
     run::run("nice", &format!("cargo run --quiet --release --package torture -- {worlds}"), &[])

@@ -130,7 +130,7 @@ def test_record_and_replay_on_a_simulated_arm(lerobot: LeRobot, hand: Path) -> N
     runs = record_and_replay(lerobot, hand, *FOLLOWER)
     recorded, replayed, rows = runs.recorded, runs.replayed, runs.rows
     check_same_path("measured", recorded.measured[rows], replayed.measured[rows])
-    # What the simulated arm really did: it was measured up to 10 ms before, and goes on meanwhile.
+    # The true path of the simulated arm: a measurement is up to 10 ms old, and the arm moves on in that time.
     check_same_path("true", recorded.true[rows], replayed.true[rows])
     assert away(recorded.measured[2 : rows.stop], recorded.true[: rows.stop + 1]) < 1
 

@@ -110,7 +110,7 @@ class Sevenbot(Device, Robot):
         self._tell_change(wanted, angles)
         angles = self._caught_up(angles)
         self._send(connection, angles)
-        # The approach of a simulated arm takes no time here: without this, it would look like a pause before the next action.
+        # The approach of a simulated arm takes no real time. Without this wait it would look like a pause before the next action.
         connection.follow_time()
         self._last, self._last_time = angles, time.monotonic()
         self._log.sent(angles, connection.simulation)

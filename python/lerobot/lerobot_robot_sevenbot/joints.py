@@ -55,7 +55,7 @@ def within_limits(angles: Iterable[float]) -> Angles:
     inside = [min(max(angle, low), high) for angle, low, high in zip(angles, LOWEST, HIGHEST, strict=True)]
     linkage = inside[1] + inside[2] - LEVEL
     excess = linkage - min(max(linkage, LINKAGE[0]), LINKAGE[1])
-    # A joint that cannot give way by half leaves the rest to the other one.
+    # If one joint cannot give way by half of the excess, the other one takes the rest.
     second = min(max(inside[1] - excess / 2, LOWEST[1]), HIGHEST[1])
     third = min(max(inside[2] - (excess - (inside[1] - second)), LOWEST[2]), HIGHEST[2])
     inside[1] -= excess - (inside[2] - third)

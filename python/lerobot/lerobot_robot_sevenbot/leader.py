@@ -71,7 +71,7 @@ class SevenbotLeader(Device, Teleoperator):
         """Where the leader is, brought within the limits of the follower."""
         connection = self._open()
         if self._hand is not None:
-            # Before the time passes: what is measured then is where the hand is now.
+            # Move the hand before time passes, so that the measurement shows where the hand is now.
             self._hand.lead()
         connection.follow_time()
         self._check_health(connection.arm)

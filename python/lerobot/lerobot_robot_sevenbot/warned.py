@@ -22,7 +22,7 @@ class Warned:
 
     def __init__(self) -> None:
         """Nothing was told."""
-        # When each problem began, and when it was last there.
+        # When each problem began, and when it was last seen.
         self._problems: dict[str, tuple[float, float]] = {}
         self._told: set[str] = set()
 

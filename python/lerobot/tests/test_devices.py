@@ -110,7 +110,7 @@ def test_the_first_action_is_approached_slowly(now: Clock) -> None:
     robot.send_action(action(130, *HOME[1:]))
     assert now[0] - start == pytest.approx(2.0, abs=0.3)
     assert simulation(robot).angles[0] == pytest.approx(130, abs=1.5)
-    # It is no pause, after which the next action would be approached, too.
+    # The approach does not count as a pause, so the next action is not approached.
     start = now[0]
     run(robot, now, [[130 - step * 0.5, *HOME[1:]] for step in range(30)])
     assert now[0] - start == pytest.approx(30 * FRAME, abs=0.1)

@@ -87,13 +87,13 @@ impl Arm {
         }
         raised(py, TipTarget::guarded(wish.tip, wish.tool, wish.guard.as_ref()))?;
         let line = self.worker.call(py, move |arm, _| motion::straight_line(arm, wish, pace))?;
-        // It begins at the targets of the arm.
+        // The line begins at the targets of the arm.
         let options = PlayOptions { factor: 1.0, times: 1, approach: ApproachRule::Slowly };
         self.play_moments(py, raised(py, line)?, options)?;
         self.angles(py)
     }
 
-    /// Parks the arm, and keeps the pose if that is wished.
+    /// Parks the arm. With `keep`, also saves `pose` as the park pose of this arm.
     pub(super) fn park_at(&self, py: Python<'_>, pose: Option<FineTargets>, keep: bool) -> PyResult<Angles> {
         let parked = self.worker.call(py, move |arm, watch| motion::park(arm, pose, keep, watch))?;
         let path = sevenbot::park_poses::path().unwrap_or_default();
@@ -122,7 +122,7 @@ impl Arm {
         if !self.worker.is_open() {
             return Ok(());
         }
-        // A call of another thread that runs would be waited for.
+        // Ends calls of other threads. Otherwise this call would wait for them.
         self.worker.interrupt();
         let held = self.worker.call(py, |arm, _| motion::hold_if_moving(arm));
         self.worker.close(py);

@@ -72,12 +72,13 @@ fn made<'py>(
     Ok(class.cast_into::<PyType>()?.unbind())
 }
 
-/// A class that is both, with the name of the first. It is not in the module, so it tells `pickle` how to make it again.
+/// Makes a class with both base classes and the name of the first. It is not in the module, so it tells `pickle` how to make
+/// it again.
 fn both<'py>(ours: Bound<'py, PyType>, theirs: Bound<'py, PyType>) -> PyResult<Py<PyType>> {
     let py = ours.py();
     let (name, doc): (String, String) = (ours.name()?.extract()?, ours.getattr("__doc__")?.extract()?);
     let class = made(py, &name, (ours, theirs), &doc)?;
-    // A function of Rust alone is no method.
+    // Python does not bind a Rust function to an instance, so `partialmethod` wraps it.
     let method = py.import("functools")?.call_method1("partialmethod", (wrap_pyfunction!(reduce, py)?,))?;
     class.bind(py).setattr("__reduce__", method)?;
     Ok(class)
@@ -112,7 +113,7 @@ pub(crate) fn file_error(py: Python<'_>, path: &std::path::Path, why: &io::Error
     let text = why.to_string();
     let text = text.split(" (os error").next().unwrap_or_default().to_owned();
     let raise = || -> PyResult<PyErr> {
-        // Python chooses the class by the code.
+        // `OSError` chooses its subclass by the error code.
         let theirs = py.get_type::<PyOSError>().call1((code, &text))?.get_type();
         let ours = FileError::class(py)?;
         let is_plain = ours.is_subclass(&theirs)?;

@@ -13,7 +13,7 @@ from sevenbot_ros.parameters import WrongParameter
 from sevenbot_ros.signals import EndSignals
 from sevenbot_ros.trajectory_action import TRAJECTORIES, TrajectoryAction, published_type
 
-# Commands, a motion, another service, the trajectories, their goals, and `stop`: none of them waits for the others.
+# Threads for commands, a motion, another service, the trajectories, their goals, and `stop`, so that none waits for another.
 THREADS = 6 + TRAJECTORIES
 # The longest time until a signal is seen, in seconds.
 SIGNAL_PERIOD = 0.1
@@ -43,7 +43,7 @@ def spin(node: ArmNode, action: TrajectoryAction | None, signals: EndSignals) ->
         while rclpy.ok() and not signals.have_come:
             executor.spin_once(SIGNAL_PERIOD)
     finally:
-        # The arm first: its thread publishes until it ends.
+        # Close the arm first, because its thread publishes until it ends.
         node.close()
         executor.shutdown()
         node.destroy_node()

@@ -14,7 +14,7 @@ from sevenbot_ros.driver import Driver
 # The standard pose in degrees, and the speed to it in degrees a second.
 HOME = (90.0, 90.0, 65.0, 90.0, 90.0, 90.0, 80.0)
 HOME_SPEED = 19.0
-# The longest move, in seconds of the arm, and the time between two looks at it.
+# The longest move, in seconds of the arm's clock, and the time between two checks of its status.
 LONGEST_MOVE = 30.0
 LOOK = 0.1
 # A target may be rounded to a degree.
@@ -47,7 +47,7 @@ def home(driver: Driver) -> str:
             arm.pose(HOME, speed=HOME_SPEED, wait=False)
             _arrive(driver, arm)
         except sevenbot.NotReached:
-            # The other joints would go on, with the speeds that are put back.
+            # Otherwise the other joints go on moving, at the speeds that are restored below.
             with suppress(sevenbot.Error):
                 arm.stop()
             raise

@@ -7,7 +7,7 @@ from typing import Protocol
 
 import sevenbot
 
-# Further ahead of real time than this, the simulated clock leapt, and real time does not have to catch up.
+# If the simulated clock is further ahead of real time or behind it than this, in seconds, it is rebased and does not catch up.
 LEAP = 0.3
 # The shortest sleep, in seconds.
 STEP = 1e-5
@@ -56,7 +56,7 @@ class SimulatedClock:
     def wait_until(self, end: float) -> None:
         left = end - self.now()
         if left > 0.0:
-            # Shorter than a microsecond is no time for the arm.
+            # The arm's clock counts microseconds, so a shorter sleep would not pass any time.
             try:
                 self._arm.sleep(max(left, STEP))
             except sevenbot.Interrupted:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 from sevenbot_ros.joints import LINKAGE, NAMES, Limits, linkage_is_kept, to_degrees
 
-# A controller that goes to a limit may compute a little more. Such a position is the limit.
+# A controller may compute a position slightly beyond a limit. A position this near, in degrees, counts as the limit.
 ROUNDING = 0.1
 
 

@@ -119,7 +119,7 @@ class Driver:
         self.interlock.connect(arm)
         self._events.changed(f"the arm {arm.chip_id} answers at {arm.port}, firmware {arm.firmware}")
         try:
-            # To leave the block makes the arm hold, which fails where it is gone.
+            # Leaving the block makes the arm hold, which fails if the arm is gone.
             with arm:
                 try:
                     self._serve(arm, clock, monitor)
@@ -131,14 +131,14 @@ class Driver:
             self._closing.wait(RETRY)
 
     def _disconnect(self) -> None:
-        # First, so that no command of this time leads the arm after the next connection.
+        # Disconnect first, so that no command that comes now leads the arm after the next connection.
         self.interlock.connect(None)
         self._monitor = None
         self.leads.end(self.leads.current, "the arm is lost")
         try:
             self.streamer.close()
         except sevenbot.Error:
-            # The stream is forgotten all the same.
+            # `close` drops the stream even if it raises.
             pass
 
     def _serve(self, arm: sevenbot.Arm, clock: Clock, monitor: Monitor) -> None:

@@ -52,7 +52,7 @@ class Follower:
         goal = list(self._goal)
         for joint, angle in targets.degrees.items():
             goal[joint] = angle
-        # A hand or a restart may have left the arm outside: then only the way back is open.
+        # A hand or a restart may have left the arm outside the linkage's range. Then only targets that lead back are allowed.
         if (refusal := check_linkage(goal)) and (linkage_is_kept(self._goal) or linkage(goal) > linkage(self._goal)):
             return refusal
         distance, joint = max((abs(to - at), joint) for joint, (to, at) in enumerate(zip(goal, self._goal, strict=True)))

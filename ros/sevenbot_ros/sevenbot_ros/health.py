@@ -10,11 +10,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 
-# A servo switches itself off at 80 degrees Celsius: this tells before.
+# A servo switches itself off at 80 degrees Celsius. From this temperature on there is a warning.
 HOT = 65
 # The names of register 29.
 MOTOR_STATES = ("damping protection", "servo", "forceless")
-# The blocks that tell, each one short read.
+# The ranges of registers that hold the health. Each is one short read.
 BLOCKS = ("29..31", "192..199", "240..255")
 
 

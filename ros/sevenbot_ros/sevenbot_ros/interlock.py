@@ -22,7 +22,7 @@ class Interlock:
     """The connected arm, and the reasons why it must not move."""
 
     def __init__(self) -> None:
-        # Public: a caller that acts on an answer holds this lock until it has acted, so that the answer stays true.
+        # Public, because a caller that acts on an answer of this class holds this lock meanwhile, so that the answer stays true.
         self.lock = threading.Condition()
         self._arm: sevenbot.Arm | None = None
         # Why commands are refused until `hold`, and how often the arm was stopped.
@@ -114,7 +114,7 @@ class Interlock:
     def _end_motions(self, arm: sevenbot.Arm) -> None:
         """Holds until the motions have ended that were allowed before the stop: each may write its first target after a hold."""
         while self._motions:
-            # The last hold tells what is wrong.
+            # The hold after this loop reports what is wrong.
             with suppress(sevenbot.Error):
                 arm.stop()
 

@@ -19,9 +19,9 @@ ZEROS = (90.0, 90.0, 65.0, 90.0, 90.0, 90.0, 0.0)
 PASSIVE = (("elbow", "joint_2", -1.0), ("finger", "joint_7", 0.5), ("opposite_finger", "joint_7", -0.5))
 # The arm keeps joint 2 + joint 3 of the model within this many degrees.
 LINKAGE = 71.0
-# The claw ends here, in degrees.
+# The largest angle of the claw, in degrees.
 CLAW_MAX = 84.0
-# What URDF demands as the greatest torque, in N m. The stall torque of the servos is not measured.
+# The largest torque, in N m, which URDF requires. The stall torque of the servos was not measured.
 STALL_TORQUE = 2.0
 
 

@@ -18,7 +18,7 @@ from sevenbot_ros.joints import NAMES, PASSIVE, STALL_TORQUE, speeds_to_radians,
 Quaternion = tuple[float, float, float, float]
 
 ALL_NAMES = [*NAMES, *(name for name, _, _ in PASSIVE)]
-# The axes of joints 1 and 3 to 6 in the straight pose: joint 2 turns the rear arm only, because the linkage keeps the forearm.
+# The axes of joints 1 and 3 to 6 in the straight pose. Joint 2 does not turn the tip: the linkage keeps the forearm's tilt.
 AXES = ((0, (0.0, 0.0, 1.0)), (2, (0.0, 1.0, 0.0)), (3, (-1.0, 0.0, 0.0)), (4, (0.0, 1.0, 0.0)), (5, (-1.0, 0.0, 0.0)))
 
 

@@ -49,8 +49,8 @@ class ArmNode(Node):
         self._throttle = Throttle()
         self._hardware = settings.port
         self._rules = settings.rules
-        # The time at which that of a simulated arm was 0. It begins at the present, so that stamps of programs without simulated
-        # time are near, too.
+        # The time at which the clock of a simulated arm was 0. Simulated time begins at the present time, so that it is near the
+        # stamps of programs without simulated time.
         self._epoch: float | None = None
         self._frame = f"{self.get_parameter('frame_prefix').value}base_link"
         self.driver = Driver(settings, self)
@@ -72,7 +72,7 @@ class ArmNode(Node):
             JointState,
             COMMANDS,
             self._command,
-            # Commands that come together after a pause of the network are all looked at, because each is near the one before it.
+            # Commands that arrive together after a pause of the network are all checked, because each is near the previous one.
             _quality(32, reliable=False),
             callback_group=MutuallyExclusiveCallbackGroup(),
         )
@@ -87,7 +87,7 @@ class ArmNode(Node):
         )
 
     def _open_services(self) -> None:
-        # `stop` must not wait for `home`, nor `hold`. Calls of one group wait for each other, so that they do not take all threads.
+        # `stop` and `hold` must not wait for `home`. Calls of one group wait for each other, so that threads stay free.
         motions, others = MutuallyExclusiveCallbackGroup(), MutuallyExclusiveCallbackGroup()
         self.create_service(Trigger, "stop", self._trigger(actions.stop), callback_group=ReentrantCallbackGroup())
         for name, act, group in (
@@ -161,7 +161,7 @@ class ArmNode(Node):
 
     def measured(self, measurement: Measurement) -> None:
         """Publishes the state."""
-        # The mean age of a measurement: half a cycle of the controller less than the greatest.
+        # The mean age of a measurement is half a cycle of the controller (5 ms) less than the largest.
         stamp = messages.stamp(self.seconds() - max(measurement.age - 0.005, 0.0))
         if unknown := [name for name, angle in zip(NAMES, measurement.positions, strict=True) if angle != angle]:
             self._warn("unmeasured", f"no state is published: {', '.join(unknown)} was not measured yet: is its servo plugged in?")

@@ -7,12 +7,12 @@ import sevenbot
 from sevenbot_ros.clocks import Clock, RealClock, SimulatedClock
 from sevenbot_ros.settings import Settings
 
-# The port that is no port: an arm in this process.
+# The name of the port that means a simulated arm in this process.
 SIMULATOR = "sim"
-# The arm does not measure its joints before this, in seconds.
+# The time after power-up until the arm has measured its joints, in seconds.
 START_UP = 1.0
-# The speed of a joint bounds that of a stream. An arm has this one after power-up, in steps of 1.9 degrees a second; another program
-# may have left a slow one.
+# The speed registers also limit a stream. This is their value after power-up, in steps of 1.9 degrees a second. Another
+# program may have left a lower one.
 SPEED = 60
 
 

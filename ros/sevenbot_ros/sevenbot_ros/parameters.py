@@ -44,7 +44,7 @@ def declare(node: Node) -> None:
     """Declares all of them, read only, so that a change at run time is refused rather than ignored."""
     for name, default, meaning in DECLARED:
         descriptor = ParameterDescriptor(description=meaning, read_only=True)
-        # A whole number is a number, and a chip id may look like one.
+        # On a command line `1` is an integer, also where a float is expected, and a chip id may look like a number.
         descriptor.dynamic_typing = not isinstance(default, (bool, int))
         node.declare_parameter(name, default, descriptor)
 

@@ -17,7 +17,7 @@ from sevenbot_ros.lead import Lead
 from sevenbot_ros.lead_slot import LeadSlot
 from sevenbot_ros.settings import Settings
 
-# The stream is asked this much before a point is due, and waits the rest itself. Seconds.
+# `Stream.send` is called this many seconds before a point is due, and waits for the rest itself.
 MARGIN = 0.002
 # A stream that nothing leads any more ends within this time, in seconds.
 LONGEST_END = 5.0
@@ -110,7 +110,7 @@ class Streamer:
             self._close_if_idle()
 
     def _close_if_idle(self) -> None:
-        # A stop ends the stream itself. To close it would wait until the stop has ended.
+        # A stop ends the stream itself. Closing the stream here would wait until the stop has ended.
         if not self._interlock.is_stopping:
             self.close()
 
@@ -120,7 +120,7 @@ class Streamer:
         if stream is None:
             return
         try:
-            # The kind of an exception: do not wait until the joints stand.
+            # With an exception type, `__exit__` does not wait until the joints stand.
             stream.__exit__(sevenbot.Interrupted, None, None)
         finally:
             with self._interlock.lock:

@@ -28,7 +28,7 @@ from sevenbot_ros.lead import Outcome, TrajectoryLead
 from sevenbot_ros.node import ArmNode
 from sevenbot_ros.trajectory import RawPoint, plan
 
-# Where a goal names no tolerance: degrees, because a loaded joint bends, and seconds.
+# The tolerances if a goal names none: in degrees, because a loaded joint bends, and in seconds.
 GOAL_TOLERANCE = 3.0
 GOAL_TIME = 2.0
 FEEDBACK_PERIOD = 0.1

@@ -1,10 +1,10 @@
-//! Every command times every fault of the simulator: none reports a success that was none.
+//! Every command under every fault of the simulator: no command reports success unless the arm did what was asked.
 //!
-//! A program of its own: it starts 24 arms at a time, and what a command notices of a short fault depends on how busy the
-//! machine is.
+//! This is a test program of its own, because it starts 24 arms at a time, and because what a command notices of a short
+//! fault depends on how busy the machine is.
 //!
-//! The snapshot holds what each command says under each fault. Its lines were read one by one: a command succeeds only where
-//! the arm did what it was asked, or where it was asked for words alone. docs/reliability.md has the exit statuses.
+//! The snapshot holds what each command prints under each fault. A command succeeds only where the arm did what was asked,
+//! or where the command had only to print something. docs/reliability.md has the exit statuses.
 //!
 //! `CELL="stop / silent" cargo test -p system-tests --test faults -- --nocapture` shows all that these cells say.
 
@@ -23,9 +23,9 @@ use system_tests::programs::sevenbot;
 use system_tests::simulator::Simulator;
 use system_tests::terminal::Terminal;
 
-/// Cells at the same time. They wait for most of their time.
+/// Cells that run at the same time. Each one spends most of its time waiting.
 const THREADS: usize = 24;
-/// How often rows that differ are run anew.
+/// How often rows that differ from the document are run again.
 const ROUNDS: usize = 2;
 /// The document that has a short form of the table.
 const DOCUMENT: &str = include_str!("../../../docs/reliability.md");
@@ -53,13 +53,13 @@ fn assert_no_false_success(cells: &[(String, Cell)]) {
     assert!(wrong.is_empty(), "successes that were none:\n{}\n{}", wrong.join("\n"), texts(cells));
 }
 
-/// What cells say.
+/// A line for each cell: its name, its exit status and its message.
 fn texts(cells: &[(String, Cell)]) -> String {
     cells.iter().map(|(name, cell)| format!("{name}: {} {}\n", cell.status_text(), cell.words)).collect()
 }
 
-/// Runs the rows anew that differ from the document, when the machine has only these to do: on a busy one a command may get no answer
-/// in time. A success that was none counts in each round.
+/// Runs the rows again that differ from the document. The machine is less busy then; on a busy one a command may get no
+/// answer in time. Each round checks for false success.
 fn run_again(cells: &mut [(String, Cell)]) {
     for (command, row) in COMMANDS.iter().zip(cells.chunks_mut(FAULTS.len())) {
         if !DOCUMENT.contains(&short_row(*command, row)) {
@@ -140,7 +140,7 @@ fn table(cells: &[(String, Cell)]) -> String {
         let _ = writeln!(text, "{}", command.arguments);
         for (fault, (_, cell)) in FAULTS.iter().zip(row) {
             let status = cell.status_text();
-            // After a failure it depends on the moment of the fault.
+            // After a failure, whether the arm did what was asked depends on the moment of the fault.
             let is_success = cell.status == Some(0);
             let done = match cell.is_done.filter(|_| is_success) {
                 None => "",

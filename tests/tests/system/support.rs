@@ -1,4 +1,4 @@
-//! What the system tests are built on: programs under test, frames, the relay's cuts, random numbers.
+//! Tests of the library that the system tests use: programs under test, frames, the frame splitter, random numbers.
 
 use std::process::{Command, Stdio};
 use std::sync::mpsc;

@@ -83,13 +83,13 @@ impl Chromium {
     }
 }
 
-/// The browser as a test has it: without windows, files and stored values of other tests.
+/// The browser for one test: without windows, files and stored values of other tests.
 #[derive(Debug)]
 pub struct BrowserContext {
     address: String,
     /// Its identifier in the DevTools protocol.
     pub id: Value,
-    // In this order: its windows are closed before another test has the browser.
+    // The order of these fields matters: the connection closes, and with it the windows, before another test has the browser.
     _lasts_as_long_as: Connection,
     _turn: MutexGuard<'static, Option<Chromium>>,
 }

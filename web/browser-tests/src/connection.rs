@@ -28,7 +28,7 @@ pub struct Connection {
 }
 
 impl Connection {
-    /// Connects to an address without its `ws://`, and keeps these events.
+    /// Connects to an address without its `ws://`, and keeps the events for which `is_kept` holds.
     #[must_use]
     pub fn open(address: &str, is_kept: fn(&Value) -> bool) -> Self {
         let host = address.split('/').next().unwrap_or_default();
@@ -68,7 +68,7 @@ impl Connection {
         }
     }
 
-    /// Calls a method that succeeds.
+    /// Calls a method, which must succeed.
     #[track_caller]
     pub fn call(&mut self, method: &str, parameters: Value) -> Value {
         self.try_call(method, parameters).unwrap_or_else(|error| panic!("{error}"))
@@ -80,7 +80,7 @@ pub(crate) fn variable(name: &str) -> u64 {
     std::env::var(name).ok().and_then(|number| number.parse().ok()).unwrap_or(0)
 }
 
-/// The rest of the first line of a process that begins like this.
+/// Waits for the first line that begins with `beginning`, and returns the rest of that line.
 #[track_caller]
 pub(crate) fn line_after(beginning: &str, output: Option<impl std::io::Read + Send + 'static>) -> String {
     let lines = process::lines(output.expect("a pipe"));

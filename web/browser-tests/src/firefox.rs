@@ -1,6 +1,6 @@
 //! Debian's Firefox, driven by WebDriver BiDi (a standard of the W3C).
 //!
-//! Without a screen this Firefox has no WebGL, so it gets one that no monitor shows: `Xvfb`, with OpenGL in software.
+//! Without a screen this Firefox has no WebGL, so it gets a virtual screen: `Xvfb`, with OpenGL in software.
 
 use std::fs;
 use std::process::{Command, Stdio};
@@ -86,7 +86,7 @@ impl Firefox {
         })
     }
 
-    /// Presses a key, by its code in the standard, as often as asked.
+    /// Presses a key this number of times. `key` is its code in the WebDriver standard.
     pub fn keys(&mut self, key: char, times: usize) {
         let press = ["keyDown", "keyUp"].map(|kind| json!({ "type": kind, "value": key }));
         let actions: Vec<_> = press.iter().cycle().take(2 * times).collect();

@@ -10,7 +10,7 @@ use system_tests::wait::wait_until;
 /// How many events a drag has between its ends.
 const DRAG_STEPS: u32 = 20;
 
-/// The places of these events.
+/// The positions of the events of a drag, after its start.
 fn way(from: [f64; 2], to: [f64; 2]) -> impl Iterator<Item = [f64; 2]> {
     (1..=DRAG_STEPS).map(move |step| {
         let share = f64::from(step) / f64::from(DRAG_STEPS);
@@ -79,7 +79,7 @@ impl Page {
         self.call("Input.dispatchMouseEvent", event);
     }
 
-    /// Presses a key such as `Tab`, `ArrowUp` or a space, as often as asked.
+    /// Presses a key such as `Tab`, `ArrowUp` or a space this number of times.
     pub fn keys(&mut self, key: &str, times: usize) {
         let (code, number, text) = match key {
             " " => ("Space", 32, " "),

@@ -7,8 +7,8 @@
 //! Input is made of real events: keys, mouse buttons and fingers. A test looks at the page as its user does, by pixels and by
 //! the accessibility tree, and compares with the numbers that the page's module exports. Firefox has one test of its own.
 //!
-//! No test may depend on the speed of the machine. Two variables show one that does: with `SLOW_PAGE=10` the page has a tenth of
-//! the processor, and with `LATE_TEST=1000` each step of a test comes up to 1,000 ms late, while the arm goes on.
+//! No test may depend on the speed of the machine. Two variables help to find a test that does: with `SLOW_PAGE=10` the page
+//! has a tenth of the processor. With `LATE_TEST=1000` each step of a test is up to 1,000 ms late, while the arm goes on.
 
 pub mod browser;
 pub mod class_run;

@@ -196,7 +196,7 @@ impl Page {
         self.wait_for_text("#state", "The arm is ready.");
     }
 
-    /// Waits until an element has shown a text since the last text that this waited for, also one that has gone again.
+    /// Waits until an element has shown a text, after the text that the last call waited for. The text may be gone again.
     #[track_caller]
     pub fn wait_until_said(&mut self, selector: &str, part: &str) {
         self.heard = wait_for(&format!("{selector} has said {part}"), || {
@@ -318,7 +318,7 @@ impl Page {
 
     /// Waits for the events of all that has happened.
     fn settle(&mut self) {
-        // The answer comes behind the events.
+        // The answer arrives after the events.
         self.evaluate("new Promise(done => setTimeout(done, 100))");
     }
 

@@ -55,7 +55,7 @@ impl Picture {
         numbered.map(|(index, _)| [(index % self.width) as f64 + 0.5, (index / self.width) as f64 + 0.5])
     }
 
-    /// How many of them are near a place.
+    /// The number of pixels as in [`Self::places`] that are within `radius` pixels of a place.
     #[must_use]
     pub fn near(&self, colour: [u8; 3], tolerance: u8, [x, y]: [f64; 2], radius: f64) -> usize {
         let is_near = |place: &[f64; 2]| (place[0] - x).hypot(place[1] - y) <= radius;

@@ -46,8 +46,8 @@ const DELAY_TRIES: usize = 9;
 const DROP_TIME: Duration = Duration::from_millis(300);
 /// Bytes of the frame with seven goals. It is the longest frame to the servos.
 const GOAL_FRAME_BYTES: usize = 57;
-/// Bytes that the loop queues at once. The emulator's transmitter is always empty, so one interrupt sends them all. Of the
-/// goals' frame, interrupts send seven times 8 bytes, and 1.
+/// Bytes that the loop queues at once. The emulator's transmitter is always empty, so one interrupt sends them all. For the
+/// frame of goals, seven interrupts send 8 bytes each, and one sends 1 byte.
 const SEND_CHUNK: usize = 8;
 /// Bytes that the transmitter of a USART holds: one in the shift register and one in the data register.
 const TRANSMITTER_BYTES: u64 = 2;
@@ -81,7 +81,7 @@ struct Silence {
 struct Passes {
     /// One that moves seven joints.
     cycle: u64,
-    /// Of that, from its wake-up to the first byte of the goals.
+    /// The part of `cycle` from the wake-up to the first byte of the goals.
     first_goal_byte: u64,
     /// One with nothing to do.
     idle: u64,
@@ -150,9 +150,9 @@ fn watch_for(image: &mut LoggedImage, time: Duration) -> TaskResult<Vec<TraceEve
     })
 }
 
-/// Microseconds from the last of many requests that a false header claims to the first reply: the gap of 2 ms (D4), up to a
-/// tick before the loop takes the bytes, and up to a tick by which the measurement begins too early. The most of several
-/// measurements.
+/// The delay of requests behind a false header, in microseconds: from the last of them to the first reply. It is the gap of
+/// 2 ms (D4), up to a tick until the loop takes the bytes, and up to a tick by which the measurement begins too early.
+/// Returns the largest of several measurements.
 fn behind_a_false_header() -> TaskResult<u64> {
     let mut image = LoggedImage::alone()?;
     let mut requests = vec![0xAA, 0x77, 6, 0, 0xFF];
@@ -205,8 +205,8 @@ impl ImageAddresses {
     }
 
     /// Instructions in ten milliseconds of the idle arm: one control cycle, ten polls of its lines, and reads of missing
-    /// servos. The median, because a log may or may not contain the log lines of each second. The longest masked stretch needs
-    /// one of each.
+    /// servos. The median, because a log may or may not contain the log lines of each second. For the longest masked
+    /// stretch, the logs must contain all these lines.
     fn silence(&self) -> TaskResult<Silence> {
         let mut image = LoggedImage::alone()?;
         // The pattern repeats in virtual time, which runs fast.
@@ -230,8 +230,9 @@ impl ImageAddresses {
         Err("the log shows too few milliseconds of silence, or too few log lines".into())
     }
 
-    /// Instructions from the interrupt of a request's byte, counted from the last one, until `end`. The arm sleeps when that
-    /// byte arrives, and no other event follows. A pause before the byte makes the deframer search behind the incomplete frame.
+    /// Instructions from the interrupt of one byte of a request until `end`. `from_last` is 1 for the last byte. Only logs
+    /// count in which the arm sleeps when the byte arrives and no other event follows. A pause before the byte makes the
+    /// deframer search behind the incomplete frame.
     fn paths(
         &self,
         image: &mut LoggedImage,
@@ -300,7 +301,7 @@ impl ImageAddresses {
         })
     }
 
-    /// The interrupts of a line. Both lines have the same code.
+    /// Instructions of the interrupts of the servo line. The host link uses the same code.
     fn interrupts(&self, events: &[TraceEvent]) -> TaskResult<[Figure; 3]> {
         let calls = trace::handler_calls(events, self.servo_interrupt, &self.handlers, &self.effects);
         let which = |received, sent| {
@@ -339,7 +340,7 @@ fn send_and_watch(
     Ok(events)
 }
 
-/// The median. In one of several logs another event is due at the same time, such as a read of a servo.
+/// The median. It ignores the few logs in which another event is due at the same time, such as a read of a servo.
 fn median(mut counts: Vec<u64>, what: &str) -> TaskResult<u64> {
     counts.sort_unstable();
     let median = counts.get(counts.len() / 2).copied();

@@ -88,7 +88,7 @@ fn count() -> TaskResult<(u64, usize)> {
     Ok((steps, reported))
 }
 
-/// A triangle of 120 steps around the middle.
+/// A triangle of 120 steps: from the middle up by 18 degrees, and back.
 fn target(number: usize) -> u16 {
     let phase = u16::try_from(number % 120).unwrap_or(0);
     MIDDLE + STEP * phase.min(120 - phase)

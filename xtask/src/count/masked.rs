@@ -1,4 +1,5 @@
-//! How long interrupts are masked. Meanwhile a line cannot take a byte, which lasts 1,680 cycles of the core at 1 Mbaud.
+//! How long interrupts are masked. While they are, no interrupt can take a byte from a line. At 1 Mbaud a byte lasts 1,680
+//! cycles of the core.
 
 use std::collections::HashMap;
 

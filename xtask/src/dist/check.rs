@@ -33,7 +33,7 @@ pub(super) fn check(folder: &Path, all: bool) -> TaskResult {
     Ok(())
 }
 
-/// The release that the folder says it is.
+/// The release that the note in the folder describes.
 pub(super) fn noted(folder: &Path) -> TaskResult<Release> {
     let path = folder.join(NOTE);
     let text = fs::read_to_string(&path).map_err(|why| format!("{}: {why}", path.display()))?;
@@ -63,7 +63,7 @@ fn check_file(release: &Release, name: &str) -> TaskResult {
     }
 }
 
-/// Each program says of which version it is.
+/// Checks that each program, and the metadata of each wheel, contains the version of the release.
 fn check_programs(release: &Release, files: &[(String, Vec<u8>)]) -> TaskResult {
     if files.is_empty() {
         return Err("it is empty".into());

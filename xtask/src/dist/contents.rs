@@ -4,7 +4,7 @@ use super::platform::{PLATFORMS, Platform};
 use super::release::Release;
 use super::{debian, firmware, page, sbom, wheels};
 
-/// What the folder says of itself.
+/// The note with the version, the commit and the time of the release.
 pub(super) const NOTE: &str = "RELEASE.txt";
 
 /// The names of all files but the sums.

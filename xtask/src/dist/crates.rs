@@ -6,7 +6,7 @@ use std::process::Command;
 use super::sources;
 use crate::run::{TaskResult, run_command, target_directory};
 
-/// The libraries. A registry gets those first on which others stand.
+/// The libraries, in the order of publishing: dependencies first.
 const LIBRARIES: [&str; 11] = [
     "kinematics",
     "protocol-core",
@@ -21,11 +21,11 @@ const LIBRARIES: [&str; 11] = [
     "sevenbot-serve",
 ];
 
-/// Stands in the workspace's manifest. cargo tells such packages no versions of each other.
+/// A line of the workspace's manifest. With it, cargo gives packages no versions of one another.
 const NOT_PUBLISHED: &str = "\npublish = false\n";
 const PUBLISHED: &str = "\npublish = true\n";
 
-/// Packs each library, and builds it from its archive alone, in a copy where the libraries may be published.
+/// Packs each library, and builds it from its archive alone. Works in a copy of the sources that allows publishing.
 pub(crate) fn build_from_archives() -> TaskResult {
     let copy = target_directory().join("dist-crates");
     sources::copy(&copy)?;

@@ -49,7 +49,7 @@ pub(super) fn write(release: &Release, platform: Platform, files: &[PackedFile])
     for (name, text) in [("control", control), ("md5sums", md5sums(&folder)?)] {
         put(&folder, &PackedFile::text(format!("DEBIAN/{name}"), text))?;
     }
-    // Only what is passed on has to be small: the programs of the tests have their debug information.
+    // Only a package for users has to be small. The programs of the tests are large, because they contain debug information.
     let compressor = if release.commit.is_some() { "-Zxz" } else { "-Zgzip" };
     let mut dpkg = Command::new("dpkg-deb");
     dpkg.args(["--root-owner-group", "--build", compressor])
@@ -97,7 +97,7 @@ fn copyright(mit: &str) -> String {
     format!("{COPYRIGHT}{}{APACHE}", lines.collect::<String>())
 }
 
-/// Debian's form of the changes. The words are in NEWS.
+/// The changelog in Debian's format. It refers to NEWS.gz, which lists the changes.
 fn changelog(release: &Release) -> TaskResult<String> {
     let date = Command::new("date").args(["-u", "-R", "-d", &format!("@{}", release.epoch)]).output()?;
     let date = String::from_utf8(date.stdout)?;

@@ -24,7 +24,7 @@ pub(super) fn make(folder: PathBuf) -> TaskResult {
     empty_folder(&release.folder)?;
     println!("{}", release.text());
     timed("tools", || tools::python().map(drop))?;
-    // Its build fills the time in which a single processor links.
+    // Build cargo-cyclonedx beside the page, because linking uses only one processor.
     let cyclonedx = thread::spawn(|| tools::cyclonedx().map(drop).map_err(|why| why.to_string()));
     timed("page", || {
         page::build(&release)?;
@@ -54,8 +54,8 @@ pub(super) fn make(folder: PathBuf) -> TaskResult {
     check::check(&release.folder, true)
 }
 
-/// Packs the programs that the tests of this computer built, in a folder of their own: the archive and the package. A step of
-/// the Python package installs the wheel. Returns the folder.
+/// Packs the programs that the tests have built for this computer: the archive and the package, in a folder of their own.
+/// The step of the Python package installs the wheel. Returns the folder.
 pub(super) fn make_native() -> TaskResult<PathBuf> {
     let folder = target_directory().join("dist-native");
     let release = Release { commit: None, ..Release::of_this_commit(folder)? };
@@ -78,7 +78,7 @@ fn pack(release: &Release, platform: Platform, built: &Path, common: &CommonFile
     debian::write(release, platform, &files)
 }
 
-/// What the folder says of itself, and the sums.
+/// Writes the note and the sums.
 fn finish(release: &Release) -> TaskResult {
     fs::write(release.path(NOTE), release.note())?;
     sums::write(&release.folder)

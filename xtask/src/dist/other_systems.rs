@@ -1,4 +1,4 @@
-//! Checks what claims to run on Windows and macOS, also where it cannot be linked or run.
+//! Lints the code for Windows and macOS, on a computer that can neither link nor run it.
 
 use std::process::Command;
 
@@ -13,7 +13,7 @@ const PACKAGES: [&str; 3] = ["sevenbot-cli", "sevenbot-python", "sevenbot-serve"
 /// Lints the packages. Nothing is linked, so the C code among their dependencies is not compiled: `true` stands for the compiler
 /// and for the archiver.
 pub(crate) fn lint_other_systems() -> TaskResult {
-    // Another build goes on beside this one, and would wait for its lock.
+    // A folder of its own: another build runs at the same time, and would wait for the lock of a common folder.
     let folder = target_directory().join("other-systems");
     for system in SYSTEMS {
         add_target(system)?;

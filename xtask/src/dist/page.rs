@@ -15,12 +15,12 @@ use super::release::Release;
 use crate::run::{BROWSER, TaskResult, root, run_command};
 use crate::web::{self, files};
 
-/// What the page with several files loads, and what the page in one file has instead.
+/// Parts of `index.html` that the page in one file replaces.
 const STYLE: &str = r#"<link rel="stylesheet" href="style.css">"#;
 const SCRIPT: &str = r#"<script type="module" src="start.js"></script>"#;
 const ICON: &str = r#"href="icon.svg""#;
 const POLICY: &str = "default-src 'self'; script-src 'self' 'wasm-unsafe-eval'; img-src 'self' data:;";
-/// A page from a disk may not load files beside it, so this one needs none, and loads nothing.
+/// The policy of the page in one file. A page from a disk may not load other files, so this page contains everything.
 const OWN_POLICY: &str = "default-src 'none'; script-src 'unsafe-inline' 'wasm-unsafe-eval'; \
                           style-src 'unsafe-inline'; img-src data:;";
 /// The editor of block programs: the page loads it, or finds it as this element.
@@ -75,7 +75,7 @@ fn in_one_file() -> TaskResult<String> {
 fn editor() -> TaskResult<String> {
     let [begin, end] = EDITOR;
     let code = fs::read_to_string(root().join("web/dist").join(web::EDITOR))?;
-    // Within texts of the script these mean the same, and do not end the element.
+    // In strings of the script, the escaped forms mean the same, but do not end the element.
     let code = code.replace("</script", "<\\/script").replace("<!--", "<\\!--");
     Ok(format!("{begin}{code}{end}"))
 }
@@ -88,7 +88,7 @@ fn script() -> TaskResult<String> {
     web::bindgen(&mut bindgen, &folder)?;
     let code = fs::read_to_string(folder.join("sevenbot_web.js"))?;
     let module = BASE64_STANDARD.encode(fs::read(folder.join("sevenbot_web_bg.wasm"))?);
-    // The body has to be there, as a script of the type `module` waits for it.
+    // Wait for the body, as a script of the type `module` does.
     Ok(format!(
         "<script>\n{code}\naddEventListener(\"DOMContentLoaded\", async () => {{\n  \
          const module = Uint8Array.from(atob(\"{module}\"), (letter) => letter.charCodeAt(0));\n  \

@@ -11,7 +11,7 @@ use crate::run::{TaskResult, root, run_command, target_directory};
 
 /// The profile of all programs and modules of a release.
 pub(super) const PROFILE: &str = "dist";
-/// The C library that Linux programs need at least, of the year 2012: `manylinux2014`.
+/// The oldest version of the C library with which Linux programs run: of the year 2012, as in `manylinux2014`.
 const GLIBC: &str = "2.17";
 
 /// A system that a release is for.

@@ -29,7 +29,7 @@ impl Release {
         Ok(Self { version: env!("CARGO_PKG_VERSION").to_owned(), commit: Some(commit), epoch, folder })
     }
 
-    /// What the programs and the image say of themselves: `3.0.0 (0123456789ab)`, or `3.0.0`.
+    /// The version that the programs and the image print: `3.0.0 (0123456789ab)`, or `3.0.0`.
     pub(super) fn text(&self) -> String {
         match &self.commit {
             Some(commit) => format!("{} ({commit})", self.version),

@@ -60,7 +60,7 @@ fn zig_script(name: &str, words: &str) -> TaskResult<PathBuf> {
     Ok(script)
 }
 
-/// `cargo-cyclonedx`, built without optimisation: that is sooner done.
+/// `cargo-cyclonedx`, built without optimisation, which takes less time.
 pub(super) fn cyclonedx() -> TaskResult<PathBuf> {
     let (name, version) = CYCLONEDX;
     let program = folder().join("bin").join(name);

@@ -20,7 +20,7 @@ use super::archive::PackedFile;
 use super::platform::{Platform, build_directory, read_program};
 use crate::run::{TaskResult, empty_folder, root, run_command};
 
-/// Gives the arm and its adapter names that stay, and the group `dialout` the right to open them.
+/// Gives the arm and its adapter stable names, and the group `dialout` the right to open them.
 pub(super) const UDEV_RULE: &str = "lib/udev/rules.d/70-sevenbot.rules";
 /// Where the licences and the changes are.
 pub(super) const DOC: &str = "share/doc/sevenbot";

@@ -6,9 +6,9 @@
 //!     └── a table, in which the rest enters its functions
 //! ```
 //!
-//! In the first part a short function stands for each function of the rest that it calls. It calls `need_rest` of the page,
-//! which loads the rest if it is not there yet, and then the function that the rest has entered in the table. So each choice
-//! of functions is right; a good one lets the first picture appear before the rest is loaded.
+//! For each function of the rest that the first part calls, the first part contains a short function. That function calls
+//! `need_rest` of the page, which loads the rest if necessary. Then it calls the function that the rest has entered in the
+//! table. So every choice of functions works. A good choice lets the first picture appear before the rest is loaded.
 
 use std::collections::HashSet;
 
@@ -75,7 +75,7 @@ const LATER: &[&str] = &[
     "sevenbot::register_text",
     "sevenbot::traffic_text",
     "sevenbot_web::source::serial",
-    // Ways of mathematics and of numbers in texts that are hardly ever taken.
+    // Rare cases of mathematics and of parsing numbers.
     "dec2flt::decimal_seq",
     "rem_pio2_large",
     "slice_error_fail",

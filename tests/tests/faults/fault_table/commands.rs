@@ -1,4 +1,4 @@
-//! The rows: commands that talk to an arm, what each is asked to do, and when a fault comes during it.
+//! The rows: commands that talk to an arm, what each is asked to do, and the frame at which a fault during it begins.
 
 use system_tests::registers::{EFFECTOR_TYPE, MOTOR_STATE, SPEED, TARGET_POSITION, VACUUM_PUMP};
 use system_tests::relay::Moment;
@@ -8,19 +8,19 @@ use system_tests::relay::Moment;
 pub(crate) struct Command {
     /// The arguments. `FOLDER` is a folder with the files of [`FILES`].
     pub(crate) arguments: &'static str,
-    /// Registers that are written before, each an address and a value for it and those after it.
+    /// Writes before the command: the address of the first register, and the values from there on.
     pub(crate) before: &'static [(u8, &'static [u8])],
-    /// Milliseconds between these writes and the fault, and between the fault and the command.
+    /// Virtual milliseconds between these writes and a fault that begins before the command, and from there to the command.
     pub(crate) pauses: (u64, u64),
-    /// Where a wall is in the way of joint 2, in degrees.
+    /// The angle of joint 2 at which the wall is, in degrees, if the fault is a wall.
     pub(crate) wall: u8,
     /// Does a stand support the arm, so that it does not fall without torque?
     pub(crate) is_supported: bool,
     /// Standard input.
     pub(crate) input: &'static str,
-    /// When a fault that comes during the command comes.
+    /// The frame at which a fault during the command begins.
     pub(crate) moment: Moment,
-    /// Virtual milliseconds after that fault, in which the arm notices it, before the line goes on.
+    /// Virtual milliseconds from that fault until the relay passes frames on, so that the arm notices the fault first.
     pub(crate) notice: u64,
     pub(crate) asked: Asked,
 }
@@ -32,17 +32,17 @@ pub(crate) enum Asked {
     Words,
     /// To bring joints to these angles in degrees.
     Reach(&'static [(usize, f64)]),
-    /// To park the arm there, with motors that do not drive it.
+    /// To bring joints to these angles in degrees, and to leave the arm in motor state 0, damping.
     Park(&'static [(usize, f64)]),
     /// To give joints these targets, while the motors drive them.
     Targets(&'static [(usize, u8)]),
     /// To make the arm stand still.
     Stop,
-    /// To make the motors drive the arm, and the arm stand still.
+    /// To make the motors hold the arm: motor state 1, with torque on all joints.
     Hold,
     /// To set a register.
     Register(u8, u8),
-    /// To write a recording that ends where the arm is.
+    /// To write a recording whose last pose is that of the arm.
     Record,
 }
 
@@ -106,7 +106,7 @@ impl Command {
         Self { before, pauses: (500, 1_500), ..self }
     }
 
-    /// The arm has no time to notice a fault before the line goes on.
+    /// The relay passes frames on directly after the fault, so that the arm has no time to notice it first.
     const fn at_once(self) -> Self {
         Self { notice: 0, ..self }
     }

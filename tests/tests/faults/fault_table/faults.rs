@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 use system_tests::control::Control;
 use system_tests::relay::LineAction;
 
-/// The frames before the fault are on the line for a few milliseconds.
+/// Virtual milliseconds before a fault, in which the arm carries out the frames that were sent before it.
 const BEFORE: u64 = 20;
 
 /// A column of the table.
@@ -19,11 +19,11 @@ pub(crate) struct Fault {
 pub(crate) enum Effect {
     /// Nothing.
     Nothing,
-    /// A fault of the simulator, since before the command.
+    /// A fault of the simulator that begins before the command.
     Before(&'static str),
     /// A wall in the way of joint 2.
     Wall,
-    /// A fault of the simulator that begins during the command, and how many milliseconds it lasts; `None`: it stays.
+    /// A fault of the simulator that begins during the command, and its duration in milliseconds; `None`: it does not end.
     During(&'static str, Option<u64>),
     /// A request to the simulator during the command.
     Request(&'static str),
@@ -59,7 +59,7 @@ const fn fault(name: &'static str, effect: Effect) -> Fault {
 }
 
 impl Fault {
-    /// Sets a fault that the arm has before the command. A wall is at `wall` degrees.
+    /// Sets the fault if it begins before the command. A wall is at `wall` degrees.
     pub(crate) fn begin(self, control: &mut Control, wall: u8) {
         let fault = match self.effect {
             Effect::Before(fault) => fault.to_owned(),
@@ -71,7 +71,7 @@ impl Fault {
 
     /// Begins a fault during the command. Then `notice` milliseconds of virtual time pass, in which the arm notices it.
     pub(crate) fn act(self, control: &mut Control, notice: u64) -> LineAction {
-        // The arm carries out the frames before first.
+        // First the arm carries out the frames that were sent before the fault.
         control.advance(BEFORE);
         let action = self.begin_now(control);
         if self.comes_during() && notice > 0 {
@@ -94,12 +94,12 @@ impl Fault {
         LineAction::Nothing
     }
 
-    /// Does it come during the command, at a frame of it?
+    /// Does the fault begin at a frame of the command?
     pub(crate) const fn comes_during(self) -> bool {
         !matches!(self.effect, Effect::Nothing | Effect::Before(_) | Effect::Wall | Effect::Noise)
     }
 
-    /// Does it come and go during the command?
+    /// Does the fault begin at a frame of the command and end after a given time?
     pub(crate) const fn passes(self) -> bool {
         matches!(self.effect, Effect::During(_, Some(_)))
     }
@@ -109,7 +109,7 @@ impl Fault {
     }
 }
 
-/// Joint 2 lets go: by an overload, or by heat where its servo has no torque.
+/// Makes the servo of joint 2 let go: by an overload, or by heat if the servo has no torque and refuses the overload.
 fn trip(control: &mut Control) -> LineAction {
     if control.ask(&json!({ "do": "trip", "joint": 2 }))["ok"].is_null() {
         control.result(&json!({ "do": "trip", "joint": 2, "alarm": "heat" }));

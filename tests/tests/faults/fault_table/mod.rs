@@ -28,8 +28,8 @@ pub(crate) use faults::{FAULTS, Fault};
 const AFTERWARDS: u64 = 3_000;
 /// The servos take this virtual time to start, in milliseconds.
 const START_UP: u64 = 1_500;
-/// The arm has received this many frames before, as one that was switched on long ago. A command detects a restart by the
-/// counter of frames.
+/// The number of frames that the arm receives before the command, as if it had been on for long. A command detects a
+/// restart by the counter of frames.
 const USED: usize = 100;
 /// First of the fine targets.
 const FINE_TARGET: u8 = 128;
@@ -37,16 +37,17 @@ const FINE_TARGET: u8 = 128;
 const NEAR: f64 = 3.0;
 /// A joint that moves by less than this in [`AFTERWARDS`] stands still, in degrees.
 const STILL: f64 = 1.5;
-/// The words for a supply that is lost and comes back: which ones depends on when the command reads the arm.
+/// The messages for a supply that is lost and comes back. Which one appears depends on when the command reads the arm.
 const SUPPLY_WORDS: [&str; 4] = [
     "no servo answers",
     "does not answer: its position is unknown",
     "let go: its servo holds no torque",
     "the servos lost their supply",
 ];
-/// A longer line is cut.
+/// The most characters of a message in the table. A longer one is cut.
 const LONGEST: usize = 110;
-/// A recording ends this near to where the arm is after the command, which the arm goes on meanwhile.
+/// The largest difference between the last pose of a recording and the pose when the command has ended, in degrees. An
+/// arm in motion moves on in between.
 const RECORDED: f64 = 8.0;
 
 /// What a command did.
@@ -55,9 +56,9 @@ pub(crate) struct Cell {
     pub(crate) status: Option<i32>,
     /// Did the arm do what it was asked? `None`: it was not asked to do anything.
     pub(crate) is_done: Option<bool>,
-    /// The first line of what the command says.
+    /// The first error, warning or other line that the command prints.
     pub(crate) words: String,
-    /// All that it says.
+    /// All that the command prints.
     pub(crate) text: String,
 }
 
@@ -67,7 +68,7 @@ impl Cell {
         self.status.map_or("-".to_owned(), |status| status.to_string())
     }
 
-    /// Does the command report a success that was none?
+    /// Does the command report success although the arm did not do what was asked?
     pub(crate) fn is_wrong(&self) -> bool {
         self.status == Some(0) && self.is_done == Some(false)
     }
@@ -131,7 +132,7 @@ fn run_tool(command: Command, port: &Path, folder: &Path) -> Output {
     tool.args(command.arguments.split(' ').map(|argument| argument.replace("FOLDER", place)));
     tool.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut tool = RunningProgram::spawn(&mut tool);
-    // A command that fails early does not read it.
+    // A command that fails early does not read its input.
     let _ = tool.stdin.take().expect("a pipe").write_all(command.input.as_bytes());
     tool.output()
 }
@@ -166,7 +167,7 @@ fn angle(state: &Value, joint: usize) -> f64 {
     state["joints"][joint - 1]["angle_degrees"].as_f64().expect("an angle")
 }
 
-/// Have all joints torque?
+/// Do all joints have torque?
 fn has_torque(state: &Value) -> bool {
     state["joints"].as_array().expect("joints").iter().all(|joint| joint["torque"] == "on")
 }
@@ -194,8 +195,8 @@ fn first_words(text: &str, port: &str, folder: &Path) -> String {
     words.trim_end().to_owned()
 }
 
-/// Cuts off what depends on the moment at which the command noticed a lost connection: the end of the line names the read or
-/// the write that came next.
+/// Cuts off the end of a line about a lost connection. The end names the read or the write that failed, which depends on
+/// timing.
 fn without_timing(line: &str) -> String {
     for end in ["the connection is gone", "no answer to a read"] {
         if let Some(begin) = line.find(end) {

@@ -61,7 +61,8 @@ const LOAD_REPORTS: &[u8] = &[0xAA, 0x77, 0x04, 0x5A, 0x01, 0x05, 0x0C, 0xAA];
 const NO_LOAD_REPORTS: &[u8] = &[0xAA, 0x77, 0x04, 0x5A, 0x01, 0x00, 0xCC, 0xA9];
 const IK6_TARGETS: [u8; 7] = [105, 88, 110, 90, 135, 90, 80];
 
-/// Sends a read and returns the values of the next frame, which must be its answer: the programs look no further.
+/// Sends a read and returns the values of the next frame. That frame must be the answer, because the maker's programs
+/// read only one frame.
 #[track_caller]
 fn ask(arm: &mut TestArm, request: &[u8]) -> Vec<u8> {
     arm.send(request);
@@ -203,7 +204,8 @@ fn m04_m09_python_reads_reports() {
     });
 }
 
-/// A program of the older map left its reports on. The first 04 frame ends them, so no answer is mistaken.
+/// A program of the other map has left its reports on. The first write of the next program ends them, so that it takes no
+/// report for an answer.
 #[test]
 fn m04_no_client_hears_the_other_maps_reports() {
     with_arm(TestSetup::any(), |arm| {
@@ -239,7 +241,7 @@ fn m01_gui_page_connects_and_drives() {
     });
 }
 
-/// The web page in mode HW: reports are on, but the page lives from the answers to its reads, 30 times a second.
+/// The web page in mode HW: reports are on, but the page uses the answers to its reads, 30 times a second.
 #[test]
 fn m03_m04_gui_page_shows_an_arm_that_is_moved_by_hand() {
     with_arm(TestSetup::any(), |arm| {
@@ -288,7 +290,7 @@ fn m01_m07_blockly_page() {
     });
 }
 
-/// A script that was killed leaves nothing to the next one.
+/// The reports of a program end when it closes the port, even if it was killed.
 #[test]
 fn m12_the_next_program_starts_afresh() {
     with_arm(TestSetup::any().needs(Need::SeesClosing), |arm| {

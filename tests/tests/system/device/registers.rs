@@ -31,7 +31,7 @@ fn d08_the_registers_hold_the_chip_id() {
     });
 }
 
-/// Section 2: the defaults of a new arm.
+/// The defaults of a new arm: `docs/registers.md`.
 #[test]
 fn a_new_arm_has_the_documented_defaults() {
     with_arm(TestSetup::any().needs(Need::FreshArm), |arm| {
@@ -203,7 +203,7 @@ fn d20_the_pump_is_a_register() {
     });
 }
 
-/// Section 4: accepted reads and writes are counted, with the read of the counter itself.
+/// Section 6: accepted reads and writes are counted, with the read of the counter itself.
 #[test]
 fn accepted_frames_are_counted() {
     with_arm(TestSetup::any(), |arm| {
@@ -214,7 +214,7 @@ fn accepted_frames_are_counted() {
     });
 }
 
-/// Section 4: voltage and temperature are readings of the servos.
+/// Section 6: voltage and temperature are readings of the servos.
 #[test]
 fn voltage_and_temperature_are_measured() {
     with_arm(TestSetup::any(), |arm| {

@@ -1,4 +1,4 @@
-//! Faults of servos: the status block reports them, and the other joints continue. `docs/protocol.md`, D12 and section 4.
+//! Faults of servos: the status block reports them, and the other joints continue. `docs/protocol.md`, D12 and section 6.
 
 use std::thread::sleep;
 use std::time::Duration;

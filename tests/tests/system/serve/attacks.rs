@@ -1,4 +1,5 @@
-//! Attacks on `sevenbot serve`: none moves the arm, keeps others out, or delays a stop. Each is bounded in count and time.
+//! Attacks on `sevenbot serve`. No attack moves the arm, keeps other programs out, or delays a stop. Each attack is bounded
+//! in count and time.
 
 use std::io::{Read, Write};
 use std::net::TcpStream;
@@ -35,7 +36,7 @@ fn run(served: &Served, port: &str, arguments: &[&str]) -> Output {
     tool.args(["--port", port]).args(arguments).output().expect("the tool runs")
 }
 
-/// The first joint's target does not change.
+/// Checks for half a second that the target of joint 1 does not change.
 #[track_caller]
 fn check_rests(arm: &mut ArmClient, context: &str) {
     let before = target(arm);
@@ -45,7 +46,7 @@ fn check_rests(arm: &mut ArmClient, context: &str) {
     }
 }
 
-/// Targets without end, as fast as the server takes them, for half a second at most.
+/// Sends targets as fast as the server takes them, for half a second at most.
 fn flood_with_targets(mut stream: impl Write) {
     let frames: Vec<u8> = (40..140).flat_map(|value| write_request(TARGET_POSITION, &[value])).collect();
     let end = Instant::now() + Duration::from_millis(500);
@@ -102,7 +103,8 @@ fn fragments_without_end_keep_nobody_waiting() {
     assert!(count < 20_000, "the server ended the connection");
 }
 
-/// The server reads 32 KiB of each, and not faster than four lines of 115 200 baud: that takes 711 ms, less 20 at its beginning.
+/// The server reads 32 KiB of each connection, and not faster than four lines of 115 200 baud carry: this takes 711 ms, less
+/// the 20 ms by which a connection may be ahead at its beginning.
 #[test]
 fn fragments_without_end_do_not_begin_again_at_once() {
     let served = Served::start(1, &[]);
@@ -193,7 +195,7 @@ fn the_last_write_before_a_close_is_carried_out() {
     }
 }
 
-/// The program streams on, and the arm does not follow it until it has paused.
+/// The other program goes on streaming. The arm does not follow it again until that program has paused.
 #[test]
 fn a_stop_ends_what_another_program_streams() {
     let served = Served::start(2, &[]);
@@ -201,7 +203,7 @@ fn a_stop_ends_what_another_program_streams() {
         let streaming = &AtomicBool::new(true);
         thread::scope(|scope| {
             let mut streamer = served.connect();
-            // So slowly that it does not arrive before the stop.
+            // Slow, so that the arm does not reach the target before the stop.
             streamer.write_all(&write_request(SPEED, &[5])).expect("the server takes bytes");
             scope.spawn(move || {
                 while streaming.load(Ordering::SeqCst) {
@@ -395,7 +397,7 @@ fn a_command_that_the_server_does_not_pass_on_tells_why() {
     }
 }
 
-/// What waits for a server that does not run is as old as it is.
+/// The age of a target includes the time for which it waited for a suspended server. A target that is too old is dropped.
 #[test]
 fn what_was_sent_to_a_suspended_server_moves_nothing() {
     let served = Served::start(1, &[]);

@@ -1,4 +1,4 @@
-//! Bad clients at the WebSocket of `sevenbot serve`: each harms itself at most.
+//! Bad clients of the WebSocket of `sevenbot serve`: each harms only its own connection.
 
 use std::io::{ErrorKind, Read, Write};
 use std::net::{Shutdown, TcpStream};
@@ -29,7 +29,7 @@ impl Others {
         Self { terminal: served.open("a"), tcp: served.connect(), web }
     }
 
-    /// Each of them gets its replies.
+    /// Checks that each client gets its replies.
     #[track_caller]
     fn check(&mut self) {
         for value in 1..=20 {

@@ -30,7 +30,7 @@ fn give(teacher: &mut Tab, name: &str, seconds: u32) {
     teacher.say(&json!({ "give": { "pupil": tile(&class, name)["pupil"], "seconds": seconds } }));
 }
 
-/// Waits until the class tells a pupil that it has the arm, or has it no longer.
+/// Waits until the class tells a pupil that the pupil has the arm, or (`is_yours` false) does not have it.
 #[track_caller]
 fn wait_for_arm(pupil: &mut Pupil, is_yours: bool) -> Value {
     pupil.tab.hear_where("ask", |ask| (ask["arm"]["is_yours"] == true) == is_yours)
@@ -72,7 +72,7 @@ fn wait_until_at_rest(frames: &mut WebSocket<TcpStream>) {
     });
 }
 
-/// The session ends, and the arm rests away from this angle.
+/// Checks that the session ends, and that the arm holds joint 1 away from this angle.
 #[track_caller]
 fn check_held(class: &Class, teacher: &mut Tab, frames: WebSocket<TcpStream>, degrees: u8) {
     let mut frames = frames;
@@ -136,7 +136,7 @@ fn a_whole_class_can_load_the_page_at_once() {
     assert!(lengths[0] > 500_000 && lengths.iter().all(|length| *length == lengths[0]), "{lengths:?}");
 }
 
-/// Nobody of these says a name, nor closes its connection when it is told to.
+/// The strangers send no name, and do not close their connections when the server asks them to.
 #[test]
 fn strangers_keep_neither_the_teacher_nor_the_class_out() {
     let class = Class::start(false, "robots7");
@@ -144,7 +144,7 @@ fn strangers_keep_neither_the_teacher_nor_the_class_out() {
     assert!(strangers.len() >= 64, "{} strangers", strangers.len());
     let mut teacher = class.teacher();
     shown(&mut teacher, |class| class["pupils"] == json!([]));
-    // Their connections end after ten seconds, and one more as they do not close them.
+    // The server ends their connections after ten seconds, and a second more because they do not close them.
     let mut mia = wait_for("a place", || class.try_join("Mia").ok_or_else(|| "the class is full".to_owned()));
     mia.tab.hear("ask");
     shown(&mut teacher, |class| tile(class, "Mia")["presence"] == "here");

@@ -1,4 +1,4 @@
-//! A running `sevenbot class`, and tabs of it: WebSockets of their own, without a browser.
+//! A running `sevenbot class`, and its tabs. Each tab is a WebSocket without a browser.
 
 use std::io::{Read, Write};
 use std::net::TcpStream;
@@ -17,7 +17,7 @@ use tungstenite::{Error, Message, WebSocket};
 
 use super::served::simulator;
 
-/// How long a tab waits for a message before it looks for what the test wants it to say.
+/// How long a tab waits for a message before it checks whether the test has one to send.
 const PIECE: Duration = Duration::from_millis(10);
 
 /// A class on this computer, perhaps with a simulated arm in the place of the real one.
@@ -119,7 +119,7 @@ impl Class {
         Tab::new(self.socket(&format!("/teacher?token={}", self.secret), &[]).expect("accepted"))
     }
 
-    /// The session with the real arm of a pupil. The error is the HTTP status.
+    /// Opens a pupil's session with the real arm. The error is the HTTP status.
     pub(crate) fn frames(&self, key: &str) -> Result<WebSocket<TcpStream>, u16> {
         self.socket(&format!("/frames?token={key}"), &[])
     }
@@ -158,7 +158,7 @@ impl Tab {
     }
 
     pub(crate) fn say_text(&self, text: &str) {
-        // The connection may have ended, which the test sees in what it hears.
+        // The connection may have ended. The test notices this when it receives.
         let _ = self.to_say.send(text.to_owned());
     }
 
@@ -183,7 +183,7 @@ impl Tab {
         })
     }
 
-    /// What came so far.
+    /// The messages that have arrived and were not read yet.
     pub(crate) fn heard_so_far(&self) -> Vec<Value> {
         self.heard.try_iter().collect()
     }

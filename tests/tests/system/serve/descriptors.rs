@@ -10,9 +10,9 @@ use system_tests::wait::wait_until;
 
 use super::served::{Served, exchange, simulator};
 
-/// As `ulimit -n 64` has it.
+/// The limit of `ulimit -n 64`.
 const DESCRIPTORS: usize = 64;
-/// Connections of each kind that take all that they get.
+/// Connections of each kind. All kinds together exceed the limit.
 const CONNECTIONS: usize = 60;
 
 #[test]

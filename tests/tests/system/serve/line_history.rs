@@ -6,10 +6,10 @@ use std::time::{Duration, Instant};
 
 use system_tests::relay::Passing;
 
-/// Frames that are remembered: those of more than half a minute.
+/// Reads and replies that are kept: more than half a minute of them.
 const REMEMBERED: usize = 40_000;
 
-/// What is told of the state of the line is about this time.
+/// The period that [`LineHistory::of_late`] counts.
 const LATELY: Duration = Duration::from_secs(5);
 
 #[derive(Clone, Copy)]
@@ -56,7 +56,7 @@ impl LineHistory {
         format!("reads on the line: {}, replies: {}", of_kind(false), of_kind(true))
     }
 
-    /// What became of a read of these registers that was sent at this time.
+    /// Describes what the line carried for a read of these registers that was sent at this time.
     pub(crate) fn told(&self, sent: Instant, (address, count): (u8, u8)) -> String {
         let since = |at: Instant| match at.checked_duration_since(sent) {
             Some(after) => after.as_secs_f64(),
@@ -66,7 +66,7 @@ impl LineHistory {
         let turns: Vec<String> = turns.iter().rev().take(3).map(|&at| format!("{:+.3}", since(at))).collect();
         let reads = self.reads.lock().expect("no panic");
         let end = |address: u8, count: u8| u16::from(address) + u16::from(count);
-        // The line asks for a few registers more, if another read is like this one.
+        // The server asks for a few registers more while a read of the same range is pending, so that replies can be told apart.
         let of_it = reads.iter().filter(|read| {
             let is_near = read.at >= sent && since(read.at) < 40.0 && read.count <= count + 2;
             is_near && read.address <= address && end(read.address, read.count) >= end(address, count)

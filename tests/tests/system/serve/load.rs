@@ -26,7 +26,7 @@ const LOST: Duration = Duration::from_secs(30);
 /// Rate of the reports of present angles, in map 2.1.
 const ANGLE_FEEDBACK_FREQUENCY: u8 = 82;
 
-/// Faults of a program that are described. After one reply of another program each further one is wrong, too.
+/// The most faults of a program that are described. After one crossed reply, all following replies are wrong, too.
 const MOST_DESCRIBED: usize = 5;
 
 /// What one program, or all of them, sent and received.
@@ -55,7 +55,7 @@ struct Asked<'a> {
 }
 
 impl Tally {
-    /// A reply that is lost, or one that is not that of the request.
+    /// Counts and describes a fault: a lost reply (`None`), or a frame that is not the reply to the request.
     fn fault(&mut self, asked: &Asked<'_>, received: Option<&dyn Debug>) {
         let (lost, crossed) = if received.is_some() { (0, 1) } else { (1, 0) };
         (self.lost, self.crossed) = (self.lost + lost, self.crossed + crossed);
@@ -146,7 +146,7 @@ impl Map {
     }
 }
 
-/// A program that writes its own register and reads it back until `end`. `hertz`: it also wants reports.
+/// A program that writes its own register and reads it back until `end`. `hertz` is the rate of its reports; 0: no reports.
 fn frame_program(
     mut wire: impl Wire,
     own: u8,
@@ -170,7 +170,7 @@ fn frame_program(
     tally
 }
 
-/// The next frame that is no report; `None` if none comes, however many reports do.
+/// The next frame that is no report; `None` if none arrives within [`LOST`], even if reports do.
 fn next_reply(wire: &mut impl Wire, map: Map, hertz: u8, reports: &mut usize) -> Option<Vec<u8>> {
     let end = Instant::now() + LOST;
     while Instant::now() < end {

@@ -9,7 +9,7 @@ use system_tests::wait::wait_until;
 
 use super::served::Served;
 
-/// TLS with the certificate that the user has, in the tool; the library and Python connect in the same way.
+/// The tool connects with TLS and trusts the certificate of the user. The library and Python connect in the same way.
 #[test]
 fn the_tool_connects_with_tls_and_the_certificate_of_the_server() {
     let file =
@@ -35,7 +35,7 @@ fn the_tool_connects_with_tls_and_the_certificate_of_the_server() {
     assert!(said(missing).contains("SEVENBOT_CERTIFICATE"));
     let wrong = read("localhost", Some(&key));
     assert!(!wrong.status.success(), "{wrong:?}");
-    // It has this address, too, but the certificate is not for it.
+    // The server is reachable at this address, too, but its certificate does not name it.
     let other = read("127.0.0.2", Some(&certificate));
     assert!(!other.status.success(), "{other:?}");
 }
@@ -59,7 +59,8 @@ fn announced(name: &str) -> Served {
     Served::start(1, &["--token", "correct-horse", "--listen", "0.0.0.0", "--unencrypted", "--name", name])
 }
 
-/// Another user of this computer finds it by multicast, as other computers do, and its address is known from then on.
+/// Another user of this computer finds the server by multicast, as other computers do. From then on the tool knows its
+/// address.
 #[test]
 fn a_name_is_found_on_the_network() {
     let name = format!("test-{}", std::process::id());
@@ -87,7 +88,7 @@ fn a_name_is_found_on_the_network() {
     assert!(!all_of(&run(&["ports", "--network"])).contains(&port));
 }
 
-/// Nobody announces this name, as on a network that blocks multicast.
+/// The server does not announce this name, as if the network blocked multicast.
 #[test]
 fn a_name_that_the_user_entered_needs_no_multicast() {
     let served = Served::start(1, &["--token", "correct-horse"]);

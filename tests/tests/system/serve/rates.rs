@@ -1,5 +1,5 @@
-//! How many reads the server answers, and how fast: one, ten and fifty programs on each way in. A measurement, not a check: it runs
-//! on demand, on a machine that does nothing else.
+//! How many reads the server answers, and how fast: one, ten and fifty programs for each kind of connection. This is a
+//! measurement, not a check. It runs on demand, on a machine that does nothing else.
 //!
 //! ```sh
 //! cargo test --release -p system-tests --test system serve::rates -- --ignored --nocapture
@@ -17,9 +17,9 @@ use system_tests::registers::PRESENT_POSITION;
 use super::served::{Served, WebClient, names, simulator};
 use super::stops::program::{Program, TOKEN};
 
-/// Programs on each way in.
+/// Numbers of programs for each kind of connection.
 const PROGRAMS: [usize; 3] = [1, 10, 50];
-/// Readers of 255 registers, beside which a small read is timed.
+/// Programs that read 255 registers while another one times a small read.
 const LONG_READERS: usize = 31;
 
 /// Reads registers once.
@@ -77,7 +77,7 @@ fn beside_long_readers(served: &Served) {
     });
 }
 
-/// Reads in as many threads, and prints a row of the table.
+/// Runs each program in a thread of its own, and prints a row of the table.
 fn print_row(way: &str, programs: Vec<Read>) {
     let seconds = std::env::var("SERVE_RATE_SECONDS").map_or(10, |text| text.parse().expect("a number"));
     let count = programs.len();

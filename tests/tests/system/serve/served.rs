@@ -27,7 +27,7 @@ pub(crate) struct Served {
     pub(crate) server: RunningProgram,
     pub(crate) simulator: RunningProgram,
     pub(crate) ports: Vec<PathBuf>,
-    /// Shows the frames of the server, if it was started for that.
+    /// Between the server and the simulator if a test watches the frames.
     relay: Option<Relay>,
     pub(crate) folder: TempDir,
 }
@@ -50,7 +50,7 @@ impl Served {
         Self::start_with(command, ptys, &[], None)
     }
 
-    /// Starts one whose line to the arm `watch` sees.
+    /// Starts a server. `watch` sees each frame between the server and the arm.
     pub(crate) fn start_watched(ptys: usize, options: &[&str], watch: Watch) -> Self {
         Self::start_with(tool(), ptys, options, Some(watch))
     }
@@ -70,7 +70,7 @@ impl Served {
         let (server, ports) = process::start(&mut command, ptys + 3).expect("the server is ready");
         let served = Self { server, simulator, ports, relay, folder };
         if ptys > 0 {
-            // Not over a terminal: a late reply would come to the program that opens it next.
+            // Not over a pseudo-terminal: the next program that opens it would receive a late reply.
             wait_for("the arm answers", || served.ask_for_arm(Duration::from_millis(500)));
         }
         served
@@ -105,7 +105,7 @@ impl Served {
         ready.strip_prefix("unix:").expect("a path").into()
     }
 
-    /// Asks whether the arm answers, as a program that connects to the Unix socket now and waits for so long.
+    /// Checks that the arm answers a new connection to the Unix socket within `answered`.
     pub(crate) fn ask_for_arm(&self, answered: Duration) -> Result<(), String> {
         let failed = |step: &'static str| move |error: io::Error| format!("{step}: {error}");
         let mut stream = UnixStream::connect(self.local_socket()).map_err(failed("connect"))?;
@@ -168,7 +168,7 @@ pub(crate) fn exchange(stream: &mut TcpStream, request: &[u8], expected: &[u8]) 
     assert_eq!(received, expected);
 }
 
-/// Reads up to and with these bytes.
+/// Reads up to and including these bytes.
 #[track_caller]
 pub(crate) fn read_until(stream: &mut TcpStream, end: &[u8]) -> Vec<u8> {
     let mut received = Vec::new();

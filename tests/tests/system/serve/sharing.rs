@@ -18,7 +18,7 @@ use system_tests::{read_request, write_request};
 
 use super::served::{Served, exchange, names, simulator};
 
-/// First of the set-point period (two bytes), time and action of the watchdog.
+/// First of four registers: set-point period (two bytes), time and action of the watchdog.
 const SET_POINT_PERIOD: u8 = 184;
 
 #[test]
@@ -87,7 +87,7 @@ fn programs_of_both_maps_have_their_own_reports() {
     assert_eq!(old.register(FEEDBACK_FREQUENCY), 0, "stopped by a write of map 2.1");
 }
 
-/// On a pseudo-terminal the server sees only afterwards who sent what.
+/// A pseudo-terminal does not show which program sent a byte. The server notices a close only afterwards.
 #[test]
 fn the_next_program_on_a_terminal_does_not_wait_for_what_the_one_before_asked() {
     let asked = Arc::new(AtomicUsize::new(0));
@@ -105,13 +105,14 @@ fn the_next_program_on_a_terminal_does_not_wait_for_what_the_one_before_asked() 
     let mut next = served.open("a");
     next.drain();
     assert_eq!(next.read(CHIP_ID, 6).len(), 6);
-    // Some reads were on their way already, and a busy machine sends more until the server sees the close.
+    // The server sends some reads before it notices the close, and more of them on a busy machine.
     let asked = asked.load(Ordering::SeqCst);
     assert!(asked < 100, "{asked} of 200 long reads of the program that is gone");
 }
 
-/// The program leaves more than the server reads at once, so the rest waits in the kernel when it is gone. While nobody has the
-/// terminal open, the server knows whose bytes they are; a busy machine may not run it meanwhile.
+/// The first program sends more than the server reads at once, so bytes wait in the kernel after it has closed the terminal.
+/// The server knows whose bytes they are only while the terminal is closed. A busy machine may not run the server in that time,
+/// so the test has several tries.
 #[test]
 fn the_next_program_on_a_terminal_gets_no_reply_that_waited_in_the_kernel() {
     let served = Served::start(1, &[]);

@@ -58,7 +58,8 @@ fn a_write_has_the_forms_of_the_makers_map() {
     }
 }
 
-/// M5 and M6: each program reads offsets in the form of its own last write, and as register 20 says before it.
+/// M5 and M6: each program reads offsets in the form of its own last write, and before its first write in the form that
+/// register 20 selects.
 #[test]
 fn programs_of_both_maps_read_the_same_offsets_in_their_own_forms() {
     let served = Served::start(2, &[]);
@@ -91,7 +92,7 @@ fn connect(served: &Served) -> WebClient {
     WebClient::connect(served, &[]).expect("accepted")
 }
 
-/// The angles are those of the contract's section 4.4.
+/// The expected angles were computed with the maker's own code, in double precision.
 #[test]
 fn a_page_moves_to_positions_and_learns_which_are_out_of_reach() {
     let served = Served::start(1, &[]);
@@ -128,7 +129,7 @@ fn a_page_moves_to_positions_and_learns_which_are_out_of_reach() {
     );
 }
 
-/// As at the maker's server: a position within reach engages the servos, another one leaves the motor state.
+/// As with the maker's server, a position within reach engages the servos. One out of reach leaves the motor state.
 #[test]
 fn a_position_within_reach_switches_to_the_servo_state() {
     let served = Served::start(1, &[]);

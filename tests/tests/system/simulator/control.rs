@@ -183,7 +183,7 @@ fn requests_after_an_advance_wait_for_its_end() {
     assert_eq!(faults["ok"]["ended_faults"][0]["had_no_effect"], false, "{faults}");
 }
 
-/// A client that asks and waits for the answer, with pauses in real time: all its answers, and the state at the end.
+/// Runs a client that waits for each answer and pauses in real time. Returns all answers, and the state at the end.
 fn lockstep_run(pause: Duration) -> (Vec<Vec<u8>>, Value) {
     let simulator = Simulator::start(&["--lockstep", "60000", "--fault", "3=garbled=7", "--seed", "3"]);
     let mut arm = simulator.client();

@@ -49,7 +49,7 @@ impl Terminals {
                 output(self.in_folder(tool(), &["sim", "advance", "200ms"]));
                 output(self.in_folder(tool(), arguments))
             }
-            // The test plays socat, which not every machine has.
+            // The test sends the request itself, because not every machine has socat.
             ["echo", request, "|", "socat", ..] => self.ask(request.trim_matches('\'')),
             _ => panic!("the test does not know this command: {line}"),
         }

@@ -141,7 +141,7 @@ fn recordings_are_converted_without_an_arm() {
     assert!(!folder.path().join("zero.csv").exists() && !folder.path().join("x.mcap").exists());
 }
 
-/// The output of a program that takes the standard input of another one may be gone.
+/// The program that reads the recording from a pipe may end first.
 #[test]
 fn a_reader_that_ends_ends_the_recording_and_the_arm_holds() {
     with_arm(TestSetup::any(), |arm| {

@@ -107,6 +107,7 @@ fn a_restart_of_the_arm_ends_a_recording() {
     wait_for_moments(&recording, 3);
     arm.power_cycle();
     let text = failed(&tool.output(), 1);
-    // The counter of frames tells a restart, unless the arm had received hardly any: then its reports are missed.
+    // The tool detects a restart by the counter of frames. If the arm had received only a few frames, the tool notices
+    // missing reports instead.
     assert!(text.contains("the controller restarted") || text.contains("switched off and on"), "{text}");
 }

@@ -33,7 +33,7 @@ fn masked(screen: &str, port: &Path) -> String {
     let mask = |line: &str| {
         // The weight of the arm loads the motors, so that the supply is between these two values.
         let line = line.replace(port, "PORT").replace("supply 7.3 V", "supply 7.4 V");
-        // It droops with the forearm.
+        // The tip droops with the forearm, so its position differs between runs.
         let line = line.split("   tip ").next().unwrap_or_default();
         // Braille patterns of the plots.
         let line: String =

@@ -31,7 +31,7 @@ fn start_slow_move(arm: &mut TestArm) -> (RunningProgram, BufReader<ChildStderr>
     (tool, frames)
 }
 
-/// The rest of its standard error, without frames, and its exit status.
+/// Waits for the end of the tool. Returns the rest of its standard error without frames, and its exit status.
 fn end((mut tool, mut frames): (RunningProgram, BufReader<ChildStderr>)) -> (String, Option<i32>) {
     let mut text = String::new();
     std::io::Read::read_to_string(&mut frames, &mut text).expect("text");

@@ -119,7 +119,7 @@ fn the_way_to_a_point_is_guarded_and_joints_only_warn() {
     with_arm(TestSetup::any(), |arm| {
         arm.drive_to(&[105, 88, 110, 90, 135, 90, 80]);
         let before = arm.read(TARGET_POSITION, 7);
-        // Both ends are 5 mm above this table, and the line between them.
+        // Both ends, and the line between them, are 5 mm above this table.
         let line = ["move-to", "50", "185", "50", "--table", "45", "--straight", "--dry-run"];
         succeeded(arm.sevenbot(&line));
         // Joint 2 leads and joint 3 follows slowly, so the tip is lower on the way than at both ends.

@@ -71,7 +71,7 @@ fn a_file_with_an_error_changes_nothing() {
     });
 }
 
-/// A search for a lost rate can be rehearsed on a simulator that hears only its own.
+/// With `--strict-baud` the simulator ignores frames at other baud rates, so that the search for a lost rate can be tried.
 #[test]
 fn a_lost_baud_rate_is_found() {
     let folder = tempfile::tempdir().expect("a folder");

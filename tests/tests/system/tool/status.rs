@@ -51,7 +51,7 @@ impl Rig {
         std::array::from_fn(|joint| state["joints"][joint]["angle_degrees"].as_f64().expect("an angle"))
     }
 
-    /// Sets a fault, and waits until the status tells of it.
+    /// Sets a fault, and waits until `sevenbot status` prints `told`.
     fn break_it(&self, fault: &str, told: &str) {
         self.0.says(&["fault", fault]);
         wait_until("the arm tells of the fault", || all_output(&self.run(&["status"])).contains(told));
@@ -135,8 +135,8 @@ fn a_pose_that_fails_puts_the_speeds_back() {
     rig.0.says(&["fault", "clear"]);
 }
 
-/// The stream does not run meanwhile. The controller follows a joint that fell and holds it, so only its target tells that it is
-/// elsewhere.
+/// The program is suspended during the outage. The controller sets the target of a fallen joint to where it holds it, so only
+/// that target shows the program that the joint has moved.
 #[test]
 fn d29_a_stream_tells_of_a_short_stop_in_which_a_joint_without_points_fell() {
     let rig = Rig::start();

@@ -38,7 +38,7 @@ impl StockArm {
     }
 }
 
-/// The text has these angles, to a degree.
+/// The text has these angles, within the tolerance of [`near`].
 fn assert_near(text: &str, pose: [u8; 7]) {
     let angles: Vec<u8> = text.split_whitespace().map(|word| word.parse().expect("an angle")).collect();
     assert_eq!(angles.len(), pose.len(), "{text}");

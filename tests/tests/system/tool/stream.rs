@@ -22,7 +22,7 @@ const STREAM_REGISTERS: u8 = 184;
 const HOST_SILENT: u8 = 1 << 6;
 /// Longer than the watchdog of the tool, 300 ms.
 const SILENCE: Duration = Duration::from_secs(1);
-/// The joint has left its place, and does not arrive.
+/// After this time the joint is in motion and has not arrived.
 const UNDER_WAY: Duration = Duration::from_millis(500);
 
 /// Starts `sevenbot stream` with these options. The test writes its standard input.
@@ -32,8 +32,8 @@ fn start_stream(arm: &mut TestArm, options: &[&str]) -> RunningProgram {
     RunningProgram::spawn(tool.stdout(Stdio::piped()).stderr(Stdio::piped()))
 }
 
-/// Starts `sevenbot stream` with a point far away, and waits until the first one is sent. The joint turns by 3 degrees/s, so that
-/// it is on its way for 20 s.
+/// Starts `sevenbot stream` with a point far away, and waits until the first point is sent. Joint 1 turns at 3 degrees/s, so
+/// that it moves for 20 s.
 fn start_slow_stream(arm: &mut TestArm) -> (RunningProgram, ChildStdin) {
     arm.write(SPEED, &[5]);
     assert_eq!(arm.register(SPEED), 5);

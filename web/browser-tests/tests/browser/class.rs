@@ -17,8 +17,8 @@ use crate::programs::{SLOW, open_file, open_programs};
 
 /// The tabs of a class.
 const TABS: usize = 30;
-/// No WebGL, and five pictures a second: thirty laptops draw their arms each for itself, but this computer would draw all of them in
-/// software.
+/// No WebGL, and five pictures a second. In a class each of thirty laptops draws its own arm, but this computer would draw all of
+/// them in software.
 const FEW_PICTURES: &str = "
     const request = window.requestAnimationFrame;
     window.requestAnimationFrame = act => setTimeout(() => request(act), 200);
@@ -133,7 +133,7 @@ fn the_real_arm_is_given_driven_and_taken_back() {
     let mut teacher = class.open_teacher();
     let mut mia = class.join(&teacher, "Mia");
     let mut leo = class.join(&teacher, "Leo");
-    // Her simulated arm keeps its pose meanwhile.
+    // Mia's simulated arm keeps this pose while she has the real arm.
     mia.type_into("#target-1", "110");
     mia.wait_until_joint_rests(1, 110.0);
     teacher.wait_for_text("#arm-state", "nobody has it");
@@ -179,7 +179,7 @@ fn the_real_arm_is_given_driven_and_taken_back() {
     }
 }
 
-/// A browser that keeps nothing throws where its storage is used.
+/// Imitates a browser that blocks storage: each access throws an exception.
 const BLOCK_STORAGE: &str = "
     for (const name of ['localStorage', 'sessionStorage']) {
       Object.defineProperty(window, name, { get() { throw new Error('blocked'); } });

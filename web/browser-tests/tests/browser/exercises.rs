@@ -3,7 +3,7 @@
 use browser_tests::{Page, Viewed};
 use system_tests::wait::wait_until;
 
-/// The page with the exercise of this number begun.
+/// Opens the page, and begins the exercise with this number.
 fn begun(viewed: &Viewed, number: &str) -> Page {
     let mut page = viewed.open();
     page.click("[data-action=exercises]");

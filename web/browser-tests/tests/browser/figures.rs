@@ -3,7 +3,7 @@
 use browser_tests::{Page, Viewed};
 use system_tests::wait::wait_for;
 
-/// Notes when the page drew its first picture, in milliseconds after the request. A second time after it is loaded again.
+/// Stores when the page drew its first picture, in milliseconds after the request, and the same again after a reload.
 const FIRST_PICTURE: &str = "
     (function look() {
       if (!(window.sevenbot?.frame_count() > 0)) return setTimeout(look, 1);
@@ -12,7 +12,7 @@ const FIRST_PICTURE: &str = "
 /// How long something is counted, in seconds.
 const SECONDS: f64 = 5.0;
 
-/// What a counter of the page gains in a second.
+/// The increase of a counter of the page per second.
 fn rate(page: &mut Page, counter: &str) -> f64 {
     let script = format!(
         "(async () => {{ const [time, count] = [performance.now(), {counter}]; \

@@ -5,7 +5,7 @@ use browser_tests::firefox::Firefox;
 use serde_json::Value;
 use system_tests::wait::wait_for;
 
-/// Its code in the WebDriver standard.
+/// Codes of keys in the WebDriver standard.
 const ARROW_RIGHT: char = '\u{E014}';
 const ESCAPE: char = '\u{E00C}';
 
@@ -32,7 +32,7 @@ fn the_simulated_arm_is_shown_and_moved_and_nothing_is_requested_from_elsewhere(
     });
     assert_eq!(page.evaluate("document.querySelector('#notice-bar').hidden"), true, "there is a picture");
     assert_eq!(page.errors().collect::<Vec<_>>(), [""; 0]);
-    // Firefox draws its own controls with pictures and a font that are within it.
+    // Firefox draws its own controls with built-in pictures and a built-in font, which have `data:` addresses.
     let requests: Vec<_> = page.requests().filter(|url| !url.starts_with("data:")).collect();
     assert!(!requests.is_empty());
     assert!(requests.iter().all(|url| url.starts_with(viewed.origin())), "{requests:?}");

@@ -35,8 +35,8 @@ fn wait_until_it_rests(page: &mut Page) {
     page.pass(0.5);
 }
 
-/// Sends joint 1 to 180 degrees by the keyboard, and waits until it is on its way. It goes slowly, and its time passes slowly: even
-/// without a pause of the page the way takes half a minute, so that the stop comes before its end on a busy machine, too.
+/// Sends joint 1 to 180 degrees by the keyboard, and waits until it moves. The joint is slow, and virtual time passes slowly: the
+/// move takes at least half a minute, so that a stop comes before its end on a busy machine, too.
 fn start_to_move(page: &mut Page) {
     page.click("[data-action=speed][data-value='0.25']");
     page.write_register(SPEED.address, "5");

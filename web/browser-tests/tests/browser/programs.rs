@@ -7,7 +7,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use system_tests::wait::wait_for;
 
-/// The state of the last block that is lit.
+/// The id of the lit block; empty if no block is lit.
 pub(crate) const LIT: &str = "document.querySelector('.blocklyHighlighted')?.dataset.id ?? ''";
 /// Joint 1 turns for a minute.
 pub(crate) const SLOW: &str = r#"{"blocks": {"blocks": [{"type": "arm_start", "id": "start", "next": {"block":
@@ -24,7 +24,7 @@ pub(crate) fn open_programs(page: &mut Page) {
     });
 }
 
-/// A page with its own arm, whose time passes fast, and the editor.
+/// Opens the page and the editor of programs.
 pub(crate) fn programs(viewed: &Viewed) -> Page {
     let mut page = viewed.open();
     open_programs(&mut page);
@@ -112,7 +112,7 @@ fn wait_for_lit(page: &mut Page, block: &str) {
     });
 }
 
-/// The arm stands.
+/// Checks that the program was ended, and that the arm stands.
 fn check_it_stands(page: &mut Page) {
     page.wait_for_text("#program-state", "The program was ended.");
     page.pass(0.5);

@@ -13,7 +13,7 @@ fn record(page: &mut Page, folder: &Path) -> (PathBuf, [f64; 2]) {
     let (start, target) = (page.measured()[0], page.target(1));
     page.focus("#joint-1");
     page.keys("ArrowRight", 40);
-    // A recording ends with the last reply before the click: a joint that still moved would be elsewhere then.
+    // A recording ends with the last reply before the click. A joint that still moves is elsewhere in the next reply.
     page.wait_until_joint_rests(1, target + 20.0);
     page.click("[data-action=record]");
     let end = page.measured()[0];
@@ -80,7 +80,7 @@ fn open_slow_movement(viewed: &Viewed, page: &mut Page) {
     page.wait_for_text("#recording", "recorded: ");
 }
 
-/// The movement is over, and the arm stands.
+/// Checks that the movement is over, and that the arm stands.
 fn check_it_stands(page: &mut Page) {
     let held = page.measured()[0];
     page.pass(2.0);

@@ -1,4 +1,4 @@
-//! The page in front of an arm of its own: behind `sevenbot view`, and on a serial port of the browser.
+//! The page with an arm that it does not simulate: behind `sevenbot view`, and on a serial port of the browser.
 
 use browser_tests::{Page, Viewed};
 use system_tests::wait::wait_until;
@@ -27,8 +27,8 @@ const SERIAL_PORT: &str = "
     }
     Object.defineProperty(navigator, 'serial', { value: { requestPort: async () => new Port() } });";
 
-/// Turns joint 1 by the keyboard, and waits until the arm has done so. On a late line the page takes some presses back: a target that
-/// it reads may be older than the last press.
+/// Turns joint 1 by the keyboard, and waits until the arm has done so. On a slow line the page undoes some presses, because a
+/// target that it reads may be older than the last press.
 fn check_it_moves(page: &mut Page) {
     let start = page.measured()[0];
     page.focus("#joint-1");
@@ -61,7 +61,7 @@ fn an_arm_on_a_serial_port_is_shown_moved_and_left() {
     let mut page = Page::open_after(&viewed.url, SERIAL_PORT);
     page.key("Escape");
     page.choose("#source", "usb");
-    // Until then it is the arm behind the server that is ready.
+    // Until then the page shows the arm behind the server.
     wait_until("the page uses the port", || page.evaluate("window.usesPort") == true);
     page.wait_until_ready();
     assert_eq!(page.evaluate("window.baudRate"), 115_200);

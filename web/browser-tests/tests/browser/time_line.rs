@@ -14,7 +14,7 @@ fn choose(page: &mut Page, key: &str, says: &str) {
     page.wait_for_text("#moment-text", says);
 }
 
-/// The picture of the arm.
+/// The number of pixels that differ between the pictures of the arm at two moments, which these keys choose.
 fn differences_between(page: &mut Page, keys: [&str; 2], says: [&str; 2]) -> usize {
     page.evaluate("scrollTo(0, 0)");
     let pictures = [0, 1].map(|index: usize| {

@@ -1,4 +1,4 @@
-//! A Debian with only what is always there, and Python: made once with mmdebstrap, and unpacked for each use.
+//! A minimal Debian with Python: made once with mmdebstrap, and unpacked for each use.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -10,7 +10,7 @@ use crate::run::{TaskResult, run_command, target_directory};
 
 /// The release of Debian.
 const SUITE: &str = "bookworm";
-/// A user of Python has these.
+/// The package that a user of Python has installed.
 const PYTHON: &str = "--include=python3-venv";
 /// Enters the folder `$1` and runs the script `$2` there.
 const ENTER: &str = "mount -t proc proc \"$1/proc\" && mount --rbind /dev \"$1/dev\" && \

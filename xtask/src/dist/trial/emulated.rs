@@ -13,7 +13,7 @@ use crate::dist::release::Release;
 use crate::dist::wheels;
 use crate::run::{TaskResult, run_command, target_directory};
 
-/// Emulates a program of that processor, on the system calls of this one.
+/// Emulates a program for aarch64 on the kernel of this computer.
 const QEMU: &str = "qemu-aarch64-static";
 
 /// Tries the programs and the wheel.

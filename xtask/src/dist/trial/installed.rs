@@ -15,7 +15,7 @@ use crate::python::OLDEST;
 use crate::run::{TaskResult, run_command};
 use crate::venv;
 
-/// What a user does in the first minute. `$VERSION`: what the programs say of themselves.
+/// What a user does in the first minute. `$VERSION`: the version that the programs have to print.
 const FIRST_MINUTE: &str = r#"
 for tool in cc gcc c++ rustc cargo; do
     if command -v $tool; then echo "this system is not bare"; exit 1; fi
@@ -50,7 +50,7 @@ test -s /usr/share/bash-completion/completions/sevenbot
 test -s /usr/lib/udev/rules.d/70-sevenbot.rules
 test -s /usr/share/doc/sevenbot/copyright
 "#;
-/// Nothing is left of the package.
+/// Removes the package, and checks that no file of it is left.
 const PURGED: &str = "
 dpkg --remove sevenbot
 dpkg --purge sevenbot

@@ -67,7 +67,7 @@ fn shows_joints(address: &str) -> TaskResult {
     let mut browser = Command::new("chromium");
     browser.args(["--headless", "--no-sandbox", "--enable-unsafe-swiftshader", "--disable-dev-shm-usage"]);
     browser.arg(format!("--user-data-dir={}", profile.path().display()));
-    // Time of the page, not of this computer.
+    // The budget is virtual time of the page, not real time.
     browser
         .args(["--virtual-time-budget=20000", "--dump-dom", &with_program(address)?])
         .stderr(Stdio::null());

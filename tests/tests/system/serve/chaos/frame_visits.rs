@@ -22,7 +22,7 @@ pub(super) struct FrameVisit<'a> {
     wire: ByteWire,
     received: Vec<u8>,
     has_reports: bool,
-    /// As on a cable, what another program sent before it closed a pseudo-terminal may be answered now.
+    /// As on a cable, a reply to the program that had the pseudo-terminal open before may still come.
     may_be_stale: bool,
 }
 
@@ -34,7 +34,7 @@ impl<'a> FrameVisit<'a> {
         Some(Self { chaos, wire, received: Vec::new(), has_reports: is_terminal, may_be_stale: is_terminal })
     }
 
-    /// The next whole frame that has come. Anything but a frame is one, too, so that it is noticed.
+    /// The next whole frame that was received. Other bytes are returned behind the word `damaged`, so that the test fails.
     fn next_frame(&mut self) -> Option<Vec<u8>> {
         let length = match self.received.as_slice() {
             [0xAA, 0x77, 0x03 | 0x05, _, count, ..] => 7 + usize::from(*count),
@@ -51,8 +51,8 @@ impl<'a> FrameVisit<'a> {
             .or(Some([b"damaged".to_vec(), frame].concat()))
     }
 
-    /// Takes the frame that begins so, and all before it: what the terminal still has of another program need not be whole frames,
-    /// because the kernel drops the bytes that were in one of its queues.
+    /// Removes the frame that begins with `start`, and all bytes before it. Those are replies to another program. They need not
+    /// be whole frames, because the kernel drops the bytes in one of its queues.
     fn take_behind_stale(&mut self, start: &[u8]) -> bool {
         let length = 7 + usize::from(start[4]);
         let frames = self.received.windows(length);
@@ -106,7 +106,7 @@ impl Visit for FrameVisit<'_> {
                 let is_report =
                     self.has_reports && frame.starts_with(&[0xAA, 0x77, 0x03, PRESENT_POSITION, 7]);
                 if !is_report {
-                    // A write that an outage took has another value.
+                    // If an outage took the write, the reply has another value.
                     if wait.may_be_cut() && frame[..5] == start[..5] {
                         return Ok(Answer::Cut);
                     }

@@ -1,5 +1,5 @@
-//! Fifty programs that come, behave badly and go, while the arm is unplugged again and again: no reply is lost, none reaches
-//! another program, and no target is carried out late.
+//! Fifty programs connect, behave badly and disconnect, while the arm is unplugged again and again. No reply is lost or
+//! reaches another program, and no target is carried out late.
 //!
 //! ```text
 //!   Visitor ──▶ Wire: pseudo-terminal, Unix socket, TCP, WebSocket ──▶ server ──▶ relay ──▶ simulator
@@ -35,18 +35,18 @@ use self::wire::{Security, WayIn};
 use super::served::{Served, names};
 
 const TOKEN: &str = "correct-horse";
-/// Programs on each way in: eight pseudo-terminals, and the others in turn.
+/// The number of programs: eight on pseudo-terminals, the others on the other kinds of connections in turn.
 const TERMINALS: usize = 8;
 const PROGRAMS: usize = 50;
-/// Time to the first outage, from the end of each to the next one, and how long each is. A reply that is missing is lost only if it
-/// was waited for until no doubt was left, and no outage came meanwhile: so the time between two is longer than that.
+/// The time to the first outage, the time between two outages, and the length of an outage. A missing reply counts as lost
+/// only after a full wait (30 s) without an outage. So the time between two outages is longer than that wait.
 const BEFORE_OUTAGES: Duration = Duration::from_secs(4);
 const BETWEEN_OUTAGES: Duration = Duration::from_secs(56);
 const OUTAGE: Duration = Duration::from_millis(3_500);
-/// A target waits in the server for 200 ms at most. The rest is for programs that the system does not run for a while. In each run of
-/// the tests, on a machine that may be busy, only what waited through an outage is late.
+/// In a campaign a target of this age is late. A target waits in the server for 200 ms at most; the rest is for times in which
+/// the system does not run a program. Other test runs use `OUTAGE` instead, because the machine may be busy.
 const LATE: Duration = Duration::from_millis(2_000);
-/// How long it is waited for the reply to one read: fifty programs use the line, and the machine may be busy.
+/// The timeout of one read in [`wait_for_arm`]. It is long: fifty programs use the line, and the machine may be busy.
 const ANSWERED: Duration = Duration::from_secs(5);
 /// Kilobytes by which the server may grow.
 const MOST_GROWTH: u64 = 8_192;
@@ -77,7 +77,7 @@ fn run(length: Duration, seed: u64, late: Duration) {
     let files = open_files(&served.server);
     let ways_in = ways_in(&served);
     let (total, memory) = thread::scope(|scope| {
-        // Ends the others also if this thread panics.
+        // Ends the programs, also if this thread panics.
         let _end = chaos.ends_at_drop();
         let mut programs = Vec::new();
         for (number, way_in) in (0..).zip(&ways_in) {
@@ -156,7 +156,7 @@ fn ways_in(served: &Served) -> Vec<WayIn> {
         _ => WayIn::Tcp(tcp.clone()),
     });
     let mut all: Vec<WayIn> = terminals.chain(others).collect();
-    // The first ones have registers of their own: they are of all kinds.
+    // The first programs have registers of their own. The rotation gives them all kinds of connections.
     all.rotate_left(TERMINALS / 2);
     all
 }
@@ -178,7 +178,7 @@ fn wait_for_arm(chaos: &Chaos, served: &Served) {
     });
 }
 
-/// Whether a process runs or waits, and the processor time that it has used.
+/// The state letter of a process from `/proc`, such as R for running, and the processor time that it has used.
 fn state_of(process: &Child) -> String {
     let stat = fs::read_to_string(format!("/proc/{}/stat", process.id())).expect("its state");
     let (_, fields) = stat.rsplit_once(')').expect("a name");

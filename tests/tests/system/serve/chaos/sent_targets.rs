@@ -1,4 +1,4 @@
-//! Targets that tell by their values when they were sent.
+//! Targets whose values hold a number. From the number follows when they were sent.
 
 use std::collections::VecDeque;
 use std::sync::Mutex;
@@ -10,11 +10,11 @@ use system_tests::relay::Passing;
 
 /// Joints whose targets hold the number of a write.
 const DIGITS: u32 = 4;
-/// Each target is one of a hundred.
+/// The number of values of a target. Each target is a digit in this base.
 const BASE: u64 = 100;
 /// The lowest target.
 const LOWEST: u64 = 40;
-/// Writes whose times are known at the same time.
+/// The number of latest writes whose times are kept.
 const KEPT: u64 = 1 << 20;
 /// Number of joints, and of the last positions that are remembered.
 const JOINTS: usize = 7;
@@ -27,8 +27,8 @@ pub(crate) struct SentTargets {
     /// Microseconds from `start` on at which the target had been sent; 0: it is being sent.
     times: Vec<AtomicU64>,
     arrived: Mutex<Vec<Duration>>,
-    /// Where the arm said it was. A stop of the maker's WebSocket writes one of these: it moves nothing, and is no target of
-    /// this list, although it may look like one that was sent long ago.
+    /// The last positions that the arm sent. A `stop` through the maker's WebSocket writes one of these as targets. Such a
+    /// write is ignored, because it may look like targets that were sent long ago.
     positions: Mutex<VecDeque<[u8; JOINTS]>>,
 }
 
@@ -50,7 +50,7 @@ impl SentTargets {
         let time = self.slot(number);
         time.store(0, Ordering::SeqCst);
         let outcome = send(targets(number));
-        // The writer may have been blocked for long: the bytes are on their way from now on.
+        // The send may have blocked for long, so the age counts from its end.
         let sent = u64::try_from(self.start.elapsed().as_micros()).expect("a test of less than an age");
         time.store(sent.max(1), Ordering::SeqCst);
         outcome
@@ -95,7 +95,8 @@ impl SentTargets {
         self.arrived.lock().expect("no panic").push(age);
     }
 
-    /// How long the targets that reached the arm had been on their way, in ascending order, and how many were sent.
+    /// The time from sending to arrival of each write of targets that reached the arm, in ascending order, and the number of
+    /// writes sent.
     pub(crate) fn ages(&self) -> (Vec<Duration>, u64) {
         let mut ages = self.arrived.lock().expect("no panic").clone();
         ages.sort_unstable();

@@ -10,8 +10,8 @@ use super::visitor::{Answer, Chaos, Tally};
 pub(super) trait Visit: Sized {
     fn chaos(&self) -> &Chaos;
 
-    /// Reads registers and checks the reply: the own register, which was written directly before, or registers that only this
-    /// program reads now.
+    /// Reads registers and checks the reply. `own` is the register of this program, which is written first. With `None` it
+    /// reads registers that no other program reads at the same time.
     fn ask(&mut self, own: Option<u8>, random: &mut Random) -> io::Result<Answer>;
 
     /// Does something without a reply.
@@ -20,7 +20,7 @@ pub(super) trait Visit: Sized {
     /// Ends the connection in one of several ways.
     fn leave(self, random: &mut Random, tally: &mut Tally);
 
-    /// Does this and that. Returns how the last question ended.
+    /// Asks questions and does other acts at random, then leaves. Returns how the last question ended.
     fn run(mut self, own: Option<u8>, random: &mut Random, tally: &mut Tally) -> Answer {
         let acts = 1 + random.below(20);
         for turn in 0..acts {

@@ -1,4 +1,4 @@
-//! A program that visits the server again and again, each time in another mood.
+//! A program that connects to the server again and again, and behaves at random each time.
 
 use std::ops::AddAssign;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -33,7 +33,7 @@ pub(crate) struct Chaos {
     is_over: AtomicBool,
     pub(crate) targets: SentTargets,
     history: LineHistory,
-    /// Odd while the arm is unplugged, and until it was seen to answer again.
+    /// The number of beginnings and ends of outages: odd from unplugging until the arm answers again.
     outages: AtomicU64,
     questions: AtomicU64,
 }
@@ -114,7 +114,7 @@ pub(super) struct ReplyWait<'a> {
     chaos: &'a Chaos,
     asked: (u8, u8),
     sent: Instant,
-    /// Nothing that stands before the reply has come since.
+    /// When the last bytes before the reply were received.
     quiet_since: Instant,
     outages: u64,
 }
@@ -126,12 +126,12 @@ impl ReplyWait<'_> {
         self.outages % 2 == 1 || now != self.outages
     }
 
-    /// A reply to the program before came, which stands before this one.
+    /// Replies to an earlier program were received, which come before this reply.
     pub(super) fn progress(&mut self) {
         self.quiet_since = Instant::now();
     }
 
-    /// Why it is waited no longer; `None` while it is.
+    /// Why the wait has ended; `None` while it goes on.
     pub(super) fn ended(&self) -> Option<Answer> {
         let elapsed = self.sent.elapsed();
         if elapsed >= AFTER_OUTAGE && self.may_be_cut() {
@@ -140,7 +140,7 @@ impl ReplyWait<'_> {
         (self.quiet_since.elapsed() >= LOST || elapsed >= LONGEST).then(|| self.lost())
     }
 
-    /// The reply is lost. Says what the line and the outages had to do with it.
+    /// The reply is lost. Prints the frames on the line and the outages around this time.
     pub(super) fn lost(&self) -> Answer {
         println!("lost: {}", self.chaos.history.told(self.sent, self.asked));
         Answer::Lost
@@ -152,11 +152,11 @@ impl ReplyWait<'_> {
 pub(super) enum Answer {
     /// Its reply.
     Replied,
-    /// Nothing: the arm was unplugged.
+    /// No reply, or one without the written value, because the arm was unplugged.
     Cut,
-    /// Nothing, although the arm was there.
+    /// No reply, although the arm was connected.
     Lost,
-    /// Something else.
+    /// Another frame than the reply.
     Crossed,
     /// The server has ended the connection.
     Ended,
@@ -169,7 +169,7 @@ pub(crate) struct Tally {
     /// Connections that ended before their first reply.
     pub(crate) turned_away: usize,
     pub(crate) replies: usize,
-    /// Questions that an outage took.
+    /// Questions without their reply because of an outage.
     pub(crate) cut: usize,
     pub(crate) lost: usize,
     pub(crate) crossed: usize,
@@ -219,7 +219,7 @@ pub(crate) fn visit(chaos: &Chaos, way_in: &WayIn, number: u8, seed: u64) -> Tal
         };
         match last {
             Some(Answer::Replied) => {}
-            // What the server still has of this program is not carried out after this time.
+            // After this time the server drops the requests of this program that it still holds.
             Some(Answer::Cut) => thread::sleep(Duration::from_millis(400)),
             None | Some(Answer::Ended) if tally.replies == before => {
                 tally.turned_away += 1;

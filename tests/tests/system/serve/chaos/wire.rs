@@ -33,11 +33,11 @@ pub(crate) enum WayIn {
     Web { address: String, is_page: bool },
 }
 
-/// What TCP and the WebSocket need.
+/// The token and the encryption of TCP and WebSocket connections.
 #[derive(Clone)]
 pub(crate) struct Security {
     pub(crate) token: &'static str,
-    /// `None`: they are not encrypted.
+    /// `None`: the connections are not encrypted.
     tls: Option<Arc<ClientConfig>>,
 }
 
@@ -112,7 +112,7 @@ pub(crate) enum ByteWire {
 }
 
 impl ByteWire {
-    /// Opens a wire; the WebSocket is none.
+    /// Opens a connection. Fails for [`WayIn::Web`], which is a [`WebWire`].
     pub(crate) fn open(way_in: &WayIn, security: &Security) -> io::Result<Self> {
         match way_in {
             WayIn::Terminal(path) => {
@@ -150,7 +150,7 @@ impl ByteWire {
         }
     }
 
-    /// Adds what comes within a tenth of a second.
+    /// Adds the bytes that arrive within [`RECEIVE_TIME`].
     pub(crate) fn receive(&mut self, received: &mut Vec<u8>) -> io::Result<()> {
         let mut bytes = [0; 4_096];
         let outcome = match self {
@@ -168,7 +168,7 @@ impl ByteWire {
         }
     }
 
-    /// Breaks the connection: what was sent and not delivered is lost. A terminal can only be closed.
+    /// Resets the connection: bytes that were not delivered are lost. A terminal can only be closed.
     pub(crate) fn reset(self) {
         match &self {
             Self::Terminal(_) => {}
@@ -208,7 +208,7 @@ impl WebWire {
         self.0.get_mut().write_all(bytes)
     }
 
-    /// The next message; `None` if none comes within a tenth of a second.
+    /// The next text message; `None` if none arrives within [`RECEIVE_TIME`].
     pub(crate) fn receive(&mut self) -> io::Result<Option<String>> {
         match self.0.read() {
             Ok(Message::Text(text)) => Ok(Some(text.as_str().to_owned())),
@@ -218,13 +218,13 @@ impl WebWire {
         }
     }
 
-    /// Takes leave as the protocol wants it.
+    /// Closes the connection with a WebSocket close frame.
     pub(crate) fn close(mut self) {
         let _ = self.0.close(None);
         let _ = self.0.flush();
     }
 
-    /// Breaks the connection.
+    /// Resets the TCP connection without a close frame.
     pub(crate) fn reset(self) {
         linger_not(self.0.get_ref().tcp());
     }

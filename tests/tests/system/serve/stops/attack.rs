@@ -1,4 +1,4 @@
-//! Attacks on the server: each of them once made a stop late or useless.
+//! Attacks on the server that could delay a stop or make the arm move after it.
 
 use std::io::{ErrorKind, Read, Write};
 use std::net::{Shutdown, TcpStream};
@@ -11,7 +11,7 @@ use super::gate::Gate;
 use super::program::{Program, TOKEN, log_in};
 use crate::serve::served::{Served, read_until, web_frame, web_handshake};
 
-/// The watchdog of a program, in hundredths of a second.
+/// The host-link watchdog, in units of 10 ms.
 const HOST_WATCHDOG: u8 = 186;
 /// Bytes without a frame.
 const NO_FRAMES: &[u8] = &[0xAA, 0x77, 0x06, 0xAA, 0x77, 0xAA, 0xFF, 0x00, 0x77, 0x03];
@@ -19,7 +19,7 @@ const NO_FRAMES: &[u8] = &[0xAA, 0x77, 0x06, 0xAA, 0x77, 0xAA, 0xFF, 0x00, 0x77,
 /// What the other programs do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Attack {
-    /// One program streams targets, as beside all other attacks.
+    /// No attack: only the program that streams targets, which also runs beside all other attacks.
     Stream,
     /// Targets, as fast as the server takes them.
     Targets,
@@ -35,7 +35,7 @@ pub(crate) enum Attack {
     Fragments,
     /// Bytes that are no frames.
     NoFrames,
-    /// Watchdogs of programs that are silent then.
+    /// Programs that set a watchdog and are silent for longer than its time.
     Watchdogs,
     /// Connections that say nothing, speak HTTP, or guess the token.
     Connections,
@@ -52,7 +52,7 @@ impl Attack {
         Self::Fragments,
         Self::NoFrames,
         Self::Watchdogs,
-        // The last one, because the next token of this address has to wait afterwards.
+        // Last, because wrong tokens delay the next token from this address.
         Self::Connections,
     ];
 
@@ -88,7 +88,7 @@ impl Attack {
     }
 }
 
-/// A program that is known to the server, and its connection.
+/// Connects a program. Its first reply shows that the server has accepted it.
 fn begin(served: &Served, gate: &Gate) -> TcpStream {
     let stream = log_in(served);
     Program(Box::new(stream.try_clone().expect("a second handle"))).read(TARGET_POSITION, 1);
@@ -116,7 +116,7 @@ fn send_without_end(mut stream: &TcpStream, gate: &Gate, bytes: &[u8]) {
             rest = &bytes;
         }
     }
-    // Nothing of what waits may be carried out in the next turn.
+    // Drop the bytes that wait in the connection, so that they are not carried out in the next turn.
     rustix::net::sockopt::set_socket_linger(stream, Some(Duration::ZERO)).expect("an option");
 }
 

@@ -41,7 +41,7 @@ impl Gate {
         End(self)
     }
 
-    /// Begins the next turn, and waits until as many programs have begun it. Fails if one of them has failed.
+    /// Begins the next turn, and waits until this number of programs has begun it. Fails if one of them has failed.
     pub(crate) fn release(&self, programs: usize) {
         let mut turns = self.lock();
         turns.count += 1;

@@ -1,9 +1,9 @@
-//! Stops through real sockets, at random moments, beside programs that attack the server: each reaches the arm, no target of
-//! another program does after it, and the arm comes to rest where it was held.
+//! Stops through real sockets, at random moments, beside programs that attack the server. Each stop reaches the arm. After it,
+//! no target of another program reaches the arm, and the arm comes to rest where it was held.
 //!
-//! Two stops beside each attack are part of each run of the tests; they depend on no time. A campaign also asserts how long a
-//! stop takes, on a machine that does nothing else. `SERVE_STOPS` is the number of stops beside each attack, and `SERVE_ATTACK` selects
-//! one, such as `Readers`. A hundred beside each take about seven minutes:
+//! Each test run makes two stops beside each attack, and checks no times. A campaign also checks how long a stop takes, on a
+//! machine that does nothing else. `SERVE_STOPS` is the number of stops beside each attack, and `SERVE_ATTACK` selects one
+//! attack, such as `Readers`. A hundred stops beside each attack take about seven minutes:
 //!
 //! ```sh
 //! SERVE_STOPS=100 cargo test --release -p system-tests --test system serve::stops -- --nocapture
@@ -33,21 +33,21 @@ const SEED: u64 = 25;
 const FINE_TARGET: u8 = 128;
 const FINE_POSITION: u8 = 142;
 const FINE: u8 = 14;
-/// How long it is watched that nothing moves the arm, after a stop and at the end of an attack.
+/// How long the test watches that nothing moves the arm: after each stop, and at rest after some stops.
 const WATCHED: Duration = Duration::from_millis(60);
 const WATCHED_AT_REST: Duration = Duration::from_millis(1_000);
-/// It is watched for so long only after some stops.
+/// The arm is watched at rest once in this number of stops, and at the end of an attack.
 const BETWEEN_RESTS: usize = 50;
 /// Movement of a joint that holds, in hundredths of a degree.
 const STILL: u16 = 30;
-/// The weight draws a joint so far off its target at most, in hundredths of a degree.
+/// The farthest that its weight draws a joint off its target, in hundredths of a degree.
 const DROOP: u16 = 150;
 
-/// A joint that the server finds farther from the target of a stop is not braking, in hundredths of a degree: on a busy machine the
-/// program that stopped it had read its position long before. The server may hold such a joint where it is.
+/// The longest braking distance, in hundredths of a degree. A joint that is farther from the target of a stop is not braking:
+/// on a busy machine the program had read the position long before. The server may hold such a joint where it is.
 const LONGEST_BRAKING: u16 = 1_500;
 
-/// How long a stop may take to the arm, and the bytes that may go to the arm meanwhile: as many as the line carries in this time.
+/// The longest time until a stop reaches the arm, and the most bytes to the arm before it: what the line carries in this time.
 const LATEST: Duration = Duration::from_millis(20);
 const MOST_BEFORE: u64 = 230;
 
@@ -74,7 +74,7 @@ struct StopTimes {
     to_arm: Duration,
     /// Bytes that went to the arm meanwhile.
     bytes: u64,
-    /// From the question where the arm is to the reply that it holds there.
+    /// From the read of the positions to the reply that confirms them as targets.
     in_all: Duration,
 }
 
@@ -122,7 +122,7 @@ fn beside(
     let gate = &Gate::default();
     let mut times = Vec::new();
     thread::scope(|scope| {
-        // Ends the others also if this thread panics.
+        // Ends the programs, also if this thread panics.
         let _end = gate.ends_others();
         let mut streamer = Program::over_tcp(served);
         scope.spawn(move || {
@@ -177,8 +177,8 @@ fn check_is_at_rest(program: &mut Program, held: &[u8], context: &str) {
     assert!(moved <= STILL, "{context}: moved by {moved} hundredths");
 }
 
-/// Stops the arm as `sevenbot stop` does: reads where it is, writes that, and reads it back, until it is so. Returns what it
-/// wrote, too.
+/// Stops the arm as `sevenbot stop` does: reads the positions, writes them as targets, and reads the targets back. Repeats this
+/// until they are equal. Also returns these targets.
 fn stop(stopper: &mut Program, line: &Line) -> (StopTimes, Vec<u8>) {
     let start = Instant::now();
     for _ in 0..100 {
@@ -187,7 +187,7 @@ fn stop(stopper: &mut Program, line: &Line) -> (StopTimes, Vec<u8>) {
         let request = write_request(FINE_TARGET, &held);
         let sent = Instant::now();
         stopper.send(&request);
-        // From now on the server can know of it.
+        // From now on the server can know of the stop.
         let bytes_at_sending = line.lock().expect("no panic").bytes;
         if stopper.read(FINE_TARGET, FINE) != held {
             continue;
@@ -202,7 +202,7 @@ fn stop(stopper: &mut Program, line: &Line) -> (StopTimes, Vec<u8>) {
     panic!("the arm did not take a stop");
 }
 
-/// No program's target has come after the stop.
+/// Checks that no other program's target has reached the arm since the stop. The other programs write coarse targets.
 #[track_caller]
 fn check_rests(line: &Line, stop: &[u8], context: &str) {
     let line = line.lock().expect("no panic");

@@ -15,16 +15,16 @@ use system_tests::{read_request, write_request};
 use super::gate::Gate;
 use crate::serve::served::Served;
 
-/// What programs have to know to connect over TCP.
+/// The token for connections over TCP.
 pub(crate) const TOKEN: &str = "correct-horse";
-/// Writing 2 to this register starts anew after a stop.
+/// A program that writes 2 to this register may drive again after a stop.
 const COMMAND: u8 = 239;
 
 pub(super) trait Wire: Read + Write + Send {}
 
 impl<W: Read + Write + Send> Wire for W {}
 
-/// A program with one request on its way at a time.
+/// A program that waits for the reply to each read before it sends the next one.
 pub(crate) struct Program(pub(super) Box<dyn Wire>);
 
 impl Program {
@@ -84,7 +84,7 @@ pub(crate) fn stream(program: &mut Program, gate: &Gate) {
     while gate.wait() {
         let goal = goals.next().expect("a goal");
         program.send(&write_request(COMMAND, &[2]));
-        // The reply tells that the command has come.
+        // The reply shows that the server has received the command.
         program.read(TARGET_POSITION, 1);
         gate.has_begun();
         while gate.is_open() {
