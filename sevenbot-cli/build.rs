@@ -1,9 +1,10 @@
-//! The program is built again when the page in it has changed.
+//! Rebuilds the program when the embedded web page has changed.
 
 use std::path::Path;
 
 fn main() {
-    // A missing folder would count as changed in each build. web/dist changes its parent when it is made.
+    // Cargo treats a missing path as changed in every build. So watch `web` until `web/dist` exists: creating `web/dist`
+    // changes its parent.
     let page = if Path::new("../web/dist").exists() { "../web/dist" } else { "../web" };
     println!("cargo::rerun-if-changed={page}");
 }

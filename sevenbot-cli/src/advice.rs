@@ -29,7 +29,6 @@ pub(crate) const fn servo(error: &ServoError) -> &'static [&'static str] {
     }
 }
 
-/// The lines as strings.
 pub(crate) fn owned(lines: &[&str]) -> Vec<String> {
     lines.iter().map(|&line| line.to_owned()).collect()
 }

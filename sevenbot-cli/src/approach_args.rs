@@ -1,4 +1,4 @@
-//! `--approach`: how far from where the arm stands a stream or a recording may begin.
+//! `--approach`: what to do if the first point of a stream or a recording is not where the arm stands.
 
 use std::time::Duration;
 

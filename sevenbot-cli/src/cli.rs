@@ -47,7 +47,7 @@ With --json, notes, warnings and errors are JSON, too: one object in a line on
 standard error. {\"error\": TEXT, \"advice\": [TEXT, ...], \"status\": NUMBER},
 {\"warning\": TEXT}, {\"note\": TEXT}. Wrong arguments are told as text.";
 
-/// `cargo xtask dist` adds the commit.
+/// The version that `--version` shows; `cargo xtask dist` sets `SEVENBOT_RELEASE` to add the commit.
 const VERSION: &str = match option_env!("SEVENBOT_RELEASE") {
     Some(release) => release,
     None => env!("CARGO_PKG_VERSION"),
@@ -64,21 +64,21 @@ pub(crate) struct Cli {
 }
 
 impl Cli {
-    /// Parses these arguments, the program first. Says what is wrong in words of the command line.
+    /// Parses `arguments`, of which the first is the name of the program. Errors about numbers are in plain words.
     pub(crate) fn from_arguments(arguments: impl Iterator<Item = OsString>) -> Result<Self, clap::Error> {
         let matches = with_negative_numbers(Self::command()).try_get_matches_from(arguments);
         matches.and_then(|matches| Self::from_arg_matches(&matches)).map_err(in_plain_words)
     }
 }
 
-/// Each value may be a negative number. So the message tells the range, and not that `-3` is no option.
+/// Lets every option take a negative number. Then the error for `-3` names the valid range, not an unknown option.
 fn with_negative_numbers(command: clap::Command) -> clap::Command {
     let allow =
         |arg: Arg| if arg.get_action().takes_values() { arg.allow_negative_numbers(true) } else { arg };
     command.mut_args(allow).mut_subcommands(with_negative_numbers)
 }
 
-/// The error with a message of its own if a value is not a whole number.
+/// Replaces the message if a value is not a valid integer, and returns other errors unchanged.
 fn in_plain_words(error: clap::Error) -> clap::Error {
     let reason = error.source().and_then(|source| source.downcast_ref::<ParseIntError>());
     let what = match reason.map(ParseIntError::kind) {
@@ -217,7 +217,7 @@ impl Command {
 }
 
 impl Command {
-    /// Does it exchange frames with an arm by itself?
+    /// Does the command itself exchange frames with an arm? `serve`, `view` and `class` leave that to their server.
     const fn opens_arm(&self) -> bool {
         match self {
             Self::Ports(_) | Self::Plot(_) | Self::Sniff(_) | Self::Servo(_) | Self::Registers(_) => false,
@@ -239,7 +239,7 @@ mod tests {
         Cli::command().debug_assert();
     }
 
-    /// clap wraps a line that is too long for the terminal, and leaves the rest of it alone on the next line.
+    /// clap breaks a line that is too long for the terminal, and puts the remaining words on a line of their own.
     #[test]
     fn the_help_fits_a_terminal_of_80_columns() {
         fn check(command: &clap::Command) {

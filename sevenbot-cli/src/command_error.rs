@@ -30,7 +30,7 @@ const SAFETY: [&str; 3] = [
 /// Why a command fails.
 #[derive(Debug)]
 pub(crate) enum CommandError {
-    /// The arm did not do what was asked.
+    /// The arm did not carry out the request.
     Arm(String),
     /// Registers did not take their values.
     NotTaken(NotTaken),
@@ -125,7 +125,7 @@ impl From<MoveError> for CommandError {
     }
 }
 
-/// A first point far from where the arm stands, with the ways out.
+/// The error for a first point too far from where the arm stands, with advice.
 fn too_far(far: &StartTooFar) -> CommandError {
     CommandError::WithAdvice {
         message: format!("{far}. The arm was not sent there"),
@@ -187,7 +187,7 @@ impl CommandError {
         }
     }
 
-    /// Prints message and advice, as text or as JSON. If that fails, the exit status remains.
+    /// Prints message and advice, as text or as JSON. A failure to print does not change the exit status.
     pub(crate) fn report(&self, err: &mut impl Write, is_json: bool) {
         let Some(message) = self.message() else { return };
         if is_json {
@@ -201,7 +201,7 @@ impl CommandError {
         }
     }
 
-    /// The message; `None` if there is none to print.
+    /// The message; `None` for a closed pipe, which is not reported.
     pub(crate) fn message(&self) -> Option<String> {
         match self {
             Self::Output(error) if error.kind() == io::ErrorKind::BrokenPipe => None,

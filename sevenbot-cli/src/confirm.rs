@@ -4,8 +4,8 @@ use std::io::{self, IsTerminal, Write};
 
 use crate::command_error::CommandError;
 
-/// Asks the question and fails unless the answer is yes. `yes` means that `--yes` was given, so it does not ask. Fails
-/// if standard input is not a terminal.
+/// Asks the question and fails unless the answer is yes. Does not ask if `yes` is true (`--yes` was given). Otherwise it also
+/// fails if standard input is not a terminal.
 pub(crate) fn confirm(question: &str, yes: bool) -> Result<(), CommandError> {
     if yes {
         return Ok(());

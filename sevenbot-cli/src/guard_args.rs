@@ -1,6 +1,7 @@
 //! `--table` and `--no-guard`: the guard of the workspace at the command line.
 //!
-//! A move of the tip that the guard does not allow is an error with advice. A command that sends joints only warns.
+//! A move of the tip that the guard does not allow is an error with advice. A command that sets the targets of joints only
+//! warns.
 
 use clap::Args;
 use sevenbot::cartesian::{Guard, StraightLineError, StraightLineFault, TipRefusal, Vector};
@@ -22,7 +23,7 @@ pub(crate) struct GuardArgs {
     no_guard: bool,
 }
 
-/// How to go on after a refusal.
+/// Advice after a refusal.
 const OPTIONS: &str = "--table Z sets the height of the table, in millimetres above the top plate: -60 is the foot of the base, \
                        and less where the arm stands on a block";
 const SWITCH: &str =
@@ -74,7 +75,7 @@ pub(crate) fn warn_of(breach: &dyn std::fmt::Display) {
     warn(format_args!("{breach}. --table sets the height of the table; --no-guard ends this warning"));
 }
 
-/// A position that is refused, with advice.
+/// The error for a refused position of the tip, with advice.
 pub(crate) fn refused(reason: &TipRefusal) -> CommandError {
     let other = reason.other_tool().map(|Vector { x, y, z }| {
         let reaches = if matches!(reason, TipRefusal::Guarded(_)) { "may go to" } else { "reaches" };
@@ -87,7 +88,7 @@ pub(crate) fn refused(reason: &TipRefusal) -> CommandError {
     }
 }
 
-/// A straight line that is refused, with advice.
+/// The error for a refused straight line, with advice.
 pub(crate) fn refused_line(reason: &StraightLineError) -> CommandError {
     let message = format!("{reason}; nothing was moved");
     match reason.fault {

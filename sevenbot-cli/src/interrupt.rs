@@ -18,7 +18,7 @@ static REQUESTS: AtomicU32 = AtomicU32::new(0);
 static MOVING: AtomicBool = AtomicBool::new(false);
 static HANDLER: Once = Once::new();
 
-/// Ctrl-C is caught.
+/// Proof that Ctrl-C is caught.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Interrupt(());
 
@@ -82,7 +82,7 @@ pub(crate) fn hold_on_interrupt<T>(
     done
 }
 
-/// Warns about joints that still move although one of them has ended the move.
+/// Warns about joints that still move although a problem of another joint has ended the move.
 fn warn_about_moving_joints(arm: &mut Arm) {
     if let Ok(Some(status)) = arm.status()
         && status.moving() != 0
@@ -103,7 +103,7 @@ pub(crate) fn hold(arm: &mut Arm) -> Result<JointSnapshot, CommandError> {
     held
 }
 
-/// Tells the user how the arm holds.
+/// Tells the user whether the arm holds.
 pub(crate) fn report_hold(joints: &JointSnapshot) {
     if joints.is_driven() {
         note("the arm holds where it is");

@@ -25,7 +25,7 @@ impl LineFile {
     }
 
     fn write(&mut self, lines: &str) -> io::Result<()> {
-        // A partial write is cut off again, except in a pipe, which has no position.
+        // Remove a partial write, except in a pipe, which has no position.
         let end = self.file.stream_position();
         let written = self.file.write_all(lines.as_bytes());
         if let (Err(_), Ok(end)) = (&written, end) {

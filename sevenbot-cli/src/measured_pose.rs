@@ -42,7 +42,7 @@ impl MeasuredPose {
         TipPose::of_fine(self.angles)
     }
 
-    /// The largest error of the tip that follows from the step of the angles, in millimetres.
+    /// The largest error of the tip that the resolution of the angles causes, in millimetres.
     pub(crate) fn rounding_mm(&self) -> f64 {
         TipPose::rounding_mm(self.angles, self.step)
     }

@@ -39,7 +39,7 @@ impl OutputFile {
         Ok(Self { path: path.to_owned(), file, is_new })
     }
 
-    /// Writes the content, in the place of an old one.
+    /// Writes the content, and replaces the old one.
     pub(crate) fn write(mut self, content: &[u8]) -> Result<(), CommandError> {
         self.is_new = false;
         self.replace(content).map_err(|error| CommandError::file(&self.path, error))
@@ -61,7 +61,8 @@ impl Drop for OutputFile {
     }
 }
 
-/// Fails if there is a file at the path that may not be replaced. A pipe or a device loses nothing.
+/// Fails if there is a file at the path that may not be replaced. Writing to a pipe or a device is always allowed, because it
+/// destroys nothing.
 pub(crate) fn check_replaceable(path: &Path, force: ForceArg) -> Result<(), CommandError> {
     if path.is_file() && !force.force {
         return Err(CommandError::file(path, "the file exists; --force replaces it"));

@@ -5,7 +5,8 @@
 //!   sevenbot get speed.1 --json    {"registers":[{"address":32,"name":"speed.1",...}]}
 //! ```
 //!
-//! JSON has one value per line, also on standard error. anstream removes the colours if the output is not a terminal, or NO_COLOR is set.
+//! JSON has one value per line, on standard error too. anstream removes the colours if the output is not a terminal, or
+//! NO_COLOR is set.
 
 use std::fmt::Display;
 use std::io::{self, IsTerminal, Write};

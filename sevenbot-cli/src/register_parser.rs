@@ -8,7 +8,7 @@ use clap::{Arg, Command, Error};
 use sevenbot::map::MAP;
 use sevenbot::names::{NameError, name_of};
 
-/// Parses registers by a function.
+/// Parses an argument by this function.
 #[derive(Clone, Copy)]
 pub(crate) struct RegisterParser<T>(pub(crate) fn(&str) -> Result<T, NameError>);
 

@@ -1,10 +1,10 @@
-//! Secrets that nobody can guess.
+//! Random secrets.
 
 use crate::command_error::CommandError;
 
-/// Letters and digits of a class code: none looks like another one on a board.
+/// Letters and digits of a class code, without those that look alike on a board: 0 and o, 1 and l.
 const CODE_LETTERS: &[u8; 32] = b"abcdefghijkmnpqrstuvwxyz23456789";
-/// The length of a class code: 30 bits, and after a wrong one the server makes who tries wait.
+/// The length of a class code, in characters: 30 random bits. After a wrong code the server delays the next try.
 const CODE_LENGTH: usize = 6;
 
 fn random<const N: usize>() -> Option<[u8; N]> {

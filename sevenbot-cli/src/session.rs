@@ -1,4 +1,4 @@
-//! What every command needs: the arm and the printer. Chooses the port.
+//! The resources of every command: the arm and the printer. Chooses the port.
 
 use std::fs::File;
 use std::io::ErrorKind;
@@ -59,7 +59,8 @@ impl Session {
         }
     }
 
-    /// As [`Self::connect`], for a command that moves the arm: [`put_right`]. Warns of an alarm, which ends no move by itself.
+    /// As [`Self::connect`], for a command that moves the arm. Also calls [`put_right`], and warns of servo alarms, which do
+    /// not end a move by themselves.
     pub(crate) fn connect_to_move(&self) -> Result<Arm, CommandError> {
         let mut arm = self.connect()?;
         arm.let_watchdog_act()?;
@@ -68,7 +69,7 @@ impl Session {
         Ok(arm)
     }
 
-    /// Opens a port, with a log if there is to be one. A log that exists already is not overwritten.
+    /// Opens a port, with a log if `--log` was given. Fails if the log file exists already.
     fn open(&self, port: String) -> Result<Arm, CommandError> {
         let failed = |error| CommandError::Open { port: port.clone(), error };
         let Some(path) = &self.log else { return Arm::open_with(&port, self.options).map_err(failed) };
@@ -84,13 +85,13 @@ impl Session {
         Arm::over(Box::new(line), &port, self.options).map_err(failed)
     }
 
-    /// The port from the command line, or the only one that leads to an arm, also through a server of this user. Without any,
-    /// that of the only simulator that runs: a pseudo-terminal is not in the list of serial ports.
+    /// The port from the command line, or the only one that leads to an arm, also through a server of this user. If there is
+    /// none, the port of the only simulator that runs: the list of serial ports has no pseudo-terminals.
     pub(crate) fn port_name(&self) -> Result<String, CommandError> {
         self.port_among(ports::reachable)
     }
 
-    /// As [`Self::port_name`], for a command that a server cannot serve: only a port of this computer.
+    /// As [`Self::port_name`], for a command that cannot work through a server: only ports of this computer.
     pub(crate) fn own_port_name(&self) -> Result<String, CommandError> {
         self.port.as_deref().map_or(Ok(()), check_is_no_server)?;
         self.port_among(ports::available)
@@ -115,7 +116,7 @@ pub(crate) fn check_is_no_server(port: &str) -> Result<(), CommandError> {
     })
 }
 
-/// Repairs what a program left in the arm when it was killed while it streamed, and tells the user.
+/// Restores the registers that a program left changed when it was killed during a stream, and tells the user.
 pub(crate) fn put_right(arm: &mut Arm) -> Result<(), CommandError> {
     if arm.end_abandoned_stream()? {
         note(

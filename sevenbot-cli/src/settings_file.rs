@@ -12,7 +12,7 @@
 //! options = 0
 //! ```
 //!
-//! Settings are the writable registers that keep their value without power. An arm of the maker has no options.
+//! Settings are the writable registers that keep their value without power. An arm with the maker's firmware has no options.
 
 use std::io::{self, Write};
 use std::path::Path;
@@ -31,10 +31,10 @@ use crate::printer::Printable;
 /// The version of the file format. Other versions are refused.
 const FORMAT: u32 = 1;
 
-/// What to do about a setting that is wrong.
+/// Advice about a wrong setting.
 const REMEDY: &str = "correct the line or delete it, or write a new file with `sevenbot backup FILE`";
 
-/// More than any file of settings, in bytes.
+/// The length limit of a settings file, in bytes. Real files are much shorter.
 const LONGEST: u64 = 1_000_000;
 
 /// The content of the file.
@@ -90,8 +90,8 @@ impl SettingsFile {
         }
     }
 
-    /// The registers `now`, changed by the settings of the file; and the settings that an arm lacks, which `serves` only
-    /// some registers.
+    /// Applies the settings of the file to the registers `now`. Also returns the settings that the arm does not have, as
+    /// `serves` tells.
     pub(crate) fn applied_to(
         &self,
         path: &Path,
@@ -128,7 +128,7 @@ fn put(registers: &mut Snapshot, address: u8, byte: u8) {
     }
 }
 
-/// The value of a setting in the file.
+/// The value of a setting, from the registers to the file.
 fn value(row: &Register, registers: &Snapshot) -> Value {
     let number = |address| Value::from(i64::from(row.range.decode_byte(registers.at(address))));
     match *row {
@@ -138,7 +138,7 @@ fn value(row: &Register, registers: &Snapshot) -> Value {
     }
 }
 
-/// The bytes of a setting from the file.
+/// The register values of a setting, from its value in the file.
 fn bytes(row: &Register, value: &Value) -> Result<Vec<u8>, String> {
     let values = value.as_array().map_or(std::slice::from_ref(value), Vec::as_slice);
     if values.len() != usize::from(row.count) {

@@ -1,4 +1,4 @@
-//! What a user has to know of new settings.
+//! Notes to the user about new settings.
 
 use sevenbot::map::{BAUD_RATE, OFFSET};
 use sevenbot::{Arm, Firmware};
@@ -15,7 +15,7 @@ pub(crate) fn note_restart(arm: &Arm, mut changed: impl Iterator<Item = u8> + Cl
     }
 }
 
-/// Do new offsets act only after a restart? Ours act at once (D9).
+/// Do new offsets act only after a restart? In this project's firmware they act at once (D9).
 pub(crate) fn uses_offsets_after_restart(arm: &Arm) -> bool {
     arm.identity().firmware() == Firmware::Makers
 }

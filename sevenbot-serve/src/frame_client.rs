@@ -1,7 +1,7 @@
 //! A client with frames as on the arm's line: parses its requests, and encodes its replies and reports.
 //!
-//! A client that does not read loses reports first. Its replies wait, its reads wait for room, and finally its bytes wait
-//! where it sent them from; its writes are carried out as long as they do not stand behind a read that waits
+//! If a client does not take its bytes, its reports are dropped first. Then its replies are queued, its reads wait for room,
+//! and finally its bytes stay in the connection. Its writes are carried out unless they are behind a read that waits
 //! ([D5](protocol_core::decisions#d5)).
 
 use protocol_core::request::{Reply, Report};
@@ -24,7 +24,7 @@ pub struct FrameClient {
     id: ClientId,
     deframer: Deframer<ToArm>,
     output: Vec<u8>,
-    /// The bytes that come are those of a program that is gone, so reads are dropped.
+    /// Reads are dropped, because the bytes come from a program that is gone.
     drops_reads: bool,
 }
 
@@ -52,7 +52,7 @@ impl FrameClient {
             if !hub.has_room(self.id) {
                 break;
             }
-            // Not more than up to the end of a frame: how old the rest is, is known where it waits.
+            // Take bytes up to the end of one frame at most. The rest stays with the caller, which knows when it was sent.
             let piece = rest.get(..self.deframer.wanted().max(1)).unwrap_or(rest);
             let count = self.deframer.push(now, piece);
             rest = rest.get(count..).unwrap_or(&[]);
@@ -78,7 +78,7 @@ impl FrameClient {
         }
     }
 
-    /// States whether reads are dropped, because who sent them is gone.
+    /// States whether reads are dropped: true while the bytes come from a program that is gone.
     pub const fn set_drops_reads(&mut self, drops_reads: bool) {
         self.drops_reads = drops_reads;
     }
@@ -110,7 +110,7 @@ impl FrameClient {
         self.output.drain(..count.min(self.output.len()));
     }
 
-    /// When silence of the client has an effect: [`FrameClient::push`] has to be called without bytes.
+    /// When to call [`FrameClient::push`] with an empty slice if the client stays silent.
     #[must_use]
     pub fn deadline(&self) -> Instant {
         self.deframer.deadline().unwrap_or(Instant::FAR_FUTURE)

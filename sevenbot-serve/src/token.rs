@@ -1,6 +1,6 @@
 //! The secret that clients from other computers have to know.
 
-/// Are both equal? The time does not tell how many bytes agree.
+/// Are both equal? The time of the comparison does not depend on how many bytes agree.
 pub(crate) fn is_equal(one: &[u8], other: &[u8]) -> bool {
     let differences = one.iter().zip(other).fold(0, |bits, (one, other)| bits | (one ^ other));
     one.len() == other.len() && std::hint::black_box(differences) == 0

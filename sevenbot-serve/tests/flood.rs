@@ -1,4 +1,5 @@
-//! A flood of one client costs the others less than 10 ms, in virtual time; and what becomes of frames without room.
+//! A flood of one client delays the others by less than 10 ms, in virtual time. Also tests frames for which the hub has no
+//! room.
 //!
 //! Pseudo-terminals and TCP have the same client, which sends frames.
 
@@ -91,7 +92,7 @@ fn a_flood_of_messages_costs_the_others_less_than_10_ms() {
     }
 }
 
-/// Only there it is known how old they are.
+/// Only the sender's connection knows how old the frames are.
 #[test]
 fn frames_that_the_hub_has_no_room_for_stay_with_their_sender() {
     let mut world = World::new(1);
@@ -114,7 +115,8 @@ fn a_stop_that_makes_room_for_a_program_is_news_for_it() {
     assert!(world.has_news(0));
 }
 
-/// A client that takes no answers: refused commands take no room each, and stops between them end the connection.
+/// The read gets no reply, so all messages wait. Refused commands in a row share one entry of the queue. With stops between
+/// them the queue grows until the connection ends.
 #[test]
 fn a_queue_of_messages_has_an_end() {
     for (flood, is_overrun) in [(r#"{"cmd":"ping"}"#, false), (r#"{"cmd":"stop"}"#, true)] {

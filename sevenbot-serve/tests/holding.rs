@@ -53,7 +53,7 @@ fn speeds(world: &World) -> Vec<u8> {
     world.arm.registers().read(SPEED.address, SPEED.count).to_vec()
 }
 
-/// Where joint 1 is, in hundredths of a degree. The line is not needed for it.
+/// Where joint 1 is, in hundredths of a degree. Read from the simulated arm, not over the line.
 fn position(world: &World) -> i32 {
     world.arm.plant().angle(Joint::ALL[0]) / 10
 }
@@ -290,7 +290,7 @@ fn a_period_that_an_outage_kept_from_the_arm_is_restored() {
     assert_eq!((period(&world), speeds(&world)), (PERIOD.to_vec(), SPEEDS.to_vec()));
 }
 
-/// The first hold is at each of its steps when no reply comes any more, also at the end, where it restores the speeds.
+/// Replies are lost from each step of the first hold on, also from its last ones, which restore the speeds.
 #[test]
 fn a_stop_slows_the_joints_down_at_each_step_of_a_hold_before_it() {
     for steps in (0..400).step_by(3) {
@@ -355,7 +355,7 @@ fn the_makers_stop_does_not_wait_for_the_commands_before_it() {
     }
 }
 
-/// The reads have no replies, so nothing of the queue is carried out meanwhile.
+/// The reads get no replies, so no command of the queue is carried out meanwhile.
 #[test]
 fn the_makers_stop_is_carried_out_however_many_commands_wait() {
     for waiting in [19, 20, 21, 400] {

@@ -37,7 +37,7 @@ fn without_an_arm_a_program_can_read_that_there_is_none() {
     assert_eq!(sharing(&mut world, 0)[4], 0);
 }
 
-/// It asks all the time, and takes no reply.
+/// The program sends reads all the time, and takes no reply.
 #[test]
 fn replies_without_an_arm_do_not_pile_up() {
     let mut world = World::new(1);
@@ -99,7 +99,7 @@ fn an_arm_without_power_is_told_while_a_program_reads_or_somebody_watches() {
     }
 }
 
-/// Replies are lost for 2.5 seconds each time, and one comes between.
+/// Replies are lost for 2.5 seconds at a time, and come again in between.
 #[test]
 fn an_arm_that_answers_seldom_is_an_arm() {
     let mut world = World::new(1);

@@ -324,7 +324,8 @@ fn a_damaged_reply_is_asked_for_again() {
     assert_eq!(world.take(2), [(DEVICE_CODE.address, vec![7])]);
 }
 
-/// All registers can be asked for in one way only, so a lost reply cannot be told from that of the read after it.
+/// The link tells equal reads apart by their length. A read of 255 registers cannot be made longer, so a lost reply cannot be
+/// told from the reply to the read after it.
 #[test]
 fn a_damaged_reply_with_all_registers_costs_no_program_its_own() {
     let mut world = World::new(3);
@@ -334,7 +335,7 @@ fn a_damaged_reply_with_all_registers_costs_no_program_its_own() {
     (0..3).for_each(|program| assert_eq!(world.take(program).len(), 1));
 }
 
-/// Behind a write the reply would be about another state than its program asked for.
+/// After a write, a repeated read would return another state than its program asked for.
 #[test]
 fn a_damaged_reply_is_lost_if_something_was_written_since() {
     let mut world = World::new(2);

@@ -29,7 +29,7 @@ fn powered_up() -> SimulatedArm<Flash> {
     SimulatedArm::new(now(), config, Flash::in_memory(), Plant::new(now()))
 }
 
-/// What the adapter does until it is stopped.
+/// Simulates the adapter and its arm until it is stopped.
 fn run_adapter(pty: &Pty, has_power: &AtomicBool, stop: &mpsc::Receiver<()>) {
     let mut arm = None;
     while stop.recv_timeout(Duration::from_millis(1)) == Err(mpsc::RecvTimeoutError::Timeout) {

@@ -1,4 +1,5 @@
-//! A stop goes before everything else and ends what others stream; what is late or has lost its sender is not carried out.
+//! A stop goes before everything else, and ends the streams of other clients. A request that is late, or whose sender is gone,
+//! is not carried out.
 //!
 //! `SERVE_STOPS` sets the number of stops beside each attack; 1000 take some minutes.
 
@@ -17,7 +18,7 @@ use sevenbot_serve::hub::HubOptions;
 
 const SEED: u64 = 25;
 const COMMAND: u8 = 239;
-/// The weight draws a joint so far off its target at most, in hundredths of a degree.
+/// The largest distance by which the weight draws a joint off its target, in hundredths of a degree.
 const DROOP: i32 = 150;
 
 fn targets(world: &World) -> Vec<u8> {
@@ -57,7 +58,7 @@ fn farthest(targets: &[u8], positions: [i32; 7]) -> i32 {
     targets.zip(positions).map(|(target, position)| (target - position).abs()).max().unwrap()
 }
 
-/// The other clients of the server while the arm is stopped.
+/// What the other clients of the server do while the arm is stopped.
 #[derive(Clone, Copy, Debug)]
 enum Attack {
     Nothing,
@@ -65,7 +66,7 @@ enum Attack {
     LongWrites,
     Targets,
     Stops,
-    /// Watchdogs of 10 ms of a program that is silent for 50 ms.
+    /// A program sets a watchdog of 10 ms, and is silent for 50 ms.
     Watchdogs,
 }
 
@@ -259,7 +260,7 @@ fn a_command_stops_an_arm_that_was_just_switched_on() {
     }
 }
 
-/// Each command begins another hold before the one before has ended.
+/// Each command begins another hold before the previous one has ended.
 #[test]
 fn commands_without_a_pause_stop_the_arm() {
     let mut world = World::new(4);

@@ -73,7 +73,8 @@ pub(crate) fn backup(session: &mut Session, args: &BackupArgs) -> Result<(), Com
     Ok(())
 }
 
-/// Writes the whole file or leaves the old one. Other things than files, such as pipes, are written to directly.
+/// Replaces an old file only when the new one is complete. With `may_replace`, anything but a regular file, such as a pipe or a
+/// link, is written to directly.
 fn write_whole(path: &Path, text: &str, may_replace: bool) -> Result<(), CommandError> {
     let is_special = fs::symlink_metadata(path).is_ok_and(|there| !there.is_file());
     if may_replace && is_special {
@@ -81,7 +82,7 @@ fn write_whole(path: &Path, text: &str, may_replace: bool) -> Result<(), Command
     }
     if may_replace {
         let beside = path.with_extension("toml.new");
-        // Removes what an earlier program left. A link that another user planted is removed too, and not followed.
+        // Remove what an earlier run left. This also removes a link that another user planted, so that it is not followed.
         let _ = fs::remove_file(&beside);
         return File::create_new(&beside)
             .and_then(|mut file| file.write_all(text.as_bytes()))
@@ -146,7 +147,7 @@ fn changed_registers(changes: &[Change], wanted: &Snapshot) -> Snapshot {
 
 /// Writes all changes in one frame: after a power cut all are old or all are new (D19).
 fn write(arm: &mut Arm, wanted: &Snapshot) -> Result<(), CommandError> {
-    // New offsets move the arm a little.
+    // New offsets move the arm a little, so Ctrl-C has to make it hold.
     let write = |arm: &mut Arm| arm.write_checked(wanted.address, &wanted.values);
     hold_on_interrupt(arm, |arm, _| Ok(arm.with_open_lock(write)?))
 }

@@ -79,7 +79,8 @@ pub(crate) fn run(session: &mut Session, args: &BaudArgs) -> Result<(), CommandE
     Ok(())
 }
 
-/// Does this arm support the rate with this code? The maker's firmware with map 2.1 takes any other code for 0.
+/// Does this arm support the rate with this code? The maker's firmware with map 2.1 supports 115200 and 1000000 baud, and
+/// treats the other codes as 0.
 fn has_baud_code(arm: &Arm, code: u8) -> bool {
     arm.identity().map() == Map::V22 || matches!(baud_rate(code), 115_200 | 1_000_000)
 }

@@ -16,9 +16,9 @@ use crate::printer::{Printable, note};
 use crate::secret::{key, new_class_code, new_secret};
 use crate::session::Session;
 
-/// The port of the pupils' address. It is short, because it stands on a board.
+/// The default TCP port. It is short, because the teacher writes the address on a board.
 const USUAL_PORT: u16 = 7700;
-/// The length of a class code that is typed.
+/// The allowed length of a `--code`, in characters.
 const CODE_LENGTH: std::ops::RangeInclusive<usize> = 6..=32;
 
 /// Teach a class: an arm in each pupil's browser, and a screen for the teacher.
@@ -114,7 +114,7 @@ fn check_encryption(args: &ClassArgs) -> Result<(), CommandError> {
     Err(CommandError::Usage(reason.to_owned()))
 }
 
-/// What the two addresses are made of.
+/// The parts of the pupils' and the teacher's addresses.
 struct Pages {
     hosts: Vec<IpAddr>,
     code: Option<String>,
@@ -149,7 +149,7 @@ fn config(
     Ok((config, pages))
 }
 
-/// The addresses of this computer that other ones reach, if it listens to all.
+/// The addresses at which other computers reach the server: `listen`, or all IPv4 addresses of this computer if it is 0.0.0.0.
 fn hosts(listen: IpAddr) -> Vec<IpAddr> {
     if !listen.is_unspecified() {
         return vec![listen];

@@ -48,7 +48,7 @@ pub(crate) fn run(session: &mut Session, args: &LogArgs) -> Result<(), CommandEr
     let mut written = 0;
     let ended = monitor::each_sample(&mut arm, monitor::period(args.hz), count, |_| {
         let length = fs::metadata(&args.file).map_err(|error| CommandError::file(&args.file, error))?.len();
-        // The log of a line ends silently when its disk is full.
+        // The log stops without an error when the disk is full. So check that the file grows.
         if length <= written {
             return Err(CommandError::file(&args.file, "the log has stopped growing: is the disk full?"));
         }

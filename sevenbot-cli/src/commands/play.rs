@@ -86,7 +86,7 @@ impl Printable for Played {
 
 pub(crate) fn run(session: &mut Session, args: &PlayArgs) -> Result<(), CommandError> {
     let recording = load(args)?;
-    // Before anything moves.
+    // Open the plot file first, so that a wrong path fails before anything moves.
     let drawn = args.plot.as_ref().map(|path| OutputFile::open(path, Some(&args.file), args.force));
     let drawn = drawn.transpose()?;
     if let Some(breach) = args.guard.guard().and_then(|guard| guard.check_recording(&recording).err()) {
@@ -104,7 +104,7 @@ pub(crate) fn run(session: &mut Session, args: &PlayArgs) -> Result<(), CommandE
     session.printer.print(&Played { times: player.played(), seconds })
 }
 
-/// Makes an arm follow a movement once that was planned from its targets. Restores the speeds and times that it had before.
+/// Makes the arm follow, once, a recording that was planned from its present targets. Restores its speeds and times afterwards.
 pub(super) fn follow(arm: &mut Arm, recording: &Recording) -> Result<(), CommandError> {
     arm.driven_joints()?;
     play(&mut Player::new(recording, 1.0).with_approach(ApproachRule::Slowly), arm, 1)
@@ -137,7 +137,7 @@ fn factor(text: &str) -> Result<f64, &'static str> {
     factor.ok_or("a factor from 0.1 to 10, as 2x or 2")
 }
 
-/// Stands for a loop without a number of times.
+/// The value of `--loop` without a number.
 const ENDLESS: &str = "endless";
 
 /// Parses how many times to play; 0 means without end.

@@ -54,7 +54,7 @@ fn way(recording: &Recording) -> Vec<WayPoint> {
     between.chain(last).collect()
 }
 
-/// A point for each degree of the joint that turns most, without the end.
+/// One point for each degree of the joint that turns most, and at least one. Begins at `from`, and excludes `to`.
 fn points_between(from: &Moment, to: &Moment) -> impl Iterator<Item = WayPoint> {
     let turns = from
         .pose

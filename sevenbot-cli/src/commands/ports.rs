@@ -91,7 +91,8 @@ fn known_name(text: &str) -> Result<KnownName, String> {
     Ok(KnownName { name, address })
 }
 
-/// The servers of the local network in the list of ports, and those that were there. They are not asked: they may want a token.
+/// Lines for the servers of the local network: those that are announced now, then the other known ones. No request is sent to
+/// them, because they may require a token.
 fn names_of_network() -> Vec<PortLine> {
     let announced: Vec<KnownName> = mdns::announced().into_iter().map(KnownName::from).collect();
     let mut known = network::known_names();

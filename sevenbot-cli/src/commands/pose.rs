@@ -88,12 +88,12 @@ struct PaceArgs {
 }
 
 impl PaceArgs {
-    /// The pace; values out of range are refused before.
+    /// The pace. The parsers of the arguments have refused values out of range.
     const fn pace(&self) -> Pace {
         Pace { speed: self.speed, time: self.time }
     }
 
-    /// Are there a speed or a duration that can be put back after the move?
+    /// Are the speed or the duration for this move only? Only a command that waits can put the old values back.
     const fn is_for_this_move(&self) -> bool {
         self.wait && (self.speed.is_some() || self.time.is_some())
     }
@@ -150,7 +150,7 @@ impl FromStr for PoseArg {
 }
 
 impl PoseArg {
-    /// The target. A step starts from the target in `bases`.
+    /// The target; `None` for no change. A step starts from `base`.
     fn target(
         self,
         joint: Joint,
@@ -160,7 +160,7 @@ impl PoseArg {
         let Self::By(step) = self else {
             return Ok(if let Self::At(angle) = self { Some(angle) } else { None });
         };
-        // The whole degrees tell whether the target is a base for a step at all.
+        // Fails if the present target of the joint is unknown.
         step_target(joints, joint, 0)?;
         let hundredths = i32::from(base.hundredths()).saturating_add(step);
         let angle = u16::try_from(hundredths).ok().and_then(FineAngle::from_hundredths);
@@ -225,11 +225,11 @@ fn wait_for_rest(arm: &mut Arm, before: &PaceBefore, error: &CommandError, inter
             joints(moving)
         ));
     }
-    // If it fails, the speeds are not put back, for the same reason.
+    // If this wait fails, `put_back` fails for the same reason, and warns.
     let _ = before.wait_for_rest(arm, &mut ProgressWatch::new(interrupt));
 }
 
-/// Puts the speeds and durations back. A failure after that of the move is only a warning.
+/// Puts the speeds and durations back. If the move has failed already, a failure here is only a warning.
 fn put_back(arm: &mut Arm, before: Option<PaceBefore>, has_failed: bool) -> Result<(), CommandError> {
     match before.map_or(Ok(()), |before| before.put_back(arm)) {
         Err(error) if has_failed => {

@@ -53,11 +53,12 @@ pub(crate) struct RecoverArgs {
     yes: bool,
 }
 
-/// Servos that were switched on need about this long until they answer.
+/// Time limit until servos answer after their supply was switched on.
 const ANSWER_TIMEOUT: Duration = Duration::from_secs(3);
-/// The arm has this time to recover.
+/// Time limit for the recovery.
 const RECOVERY_TIMEOUT: Duration = Duration::from_secs(6);
-/// It has recovered if nothing is wrong for this time: a joint is blocked after a second (D27).
+/// The arm has recovered after this time without a problem. It is longer than the second after which a joint counts as blocked
+/// (D27).
 const QUIET_TIME: Duration = Duration::from_secs(2);
 const POLL_PERIOD: Duration = Duration::from_millis(100);
 /// How long the motors are off to end an overload (forceless, then servo).
@@ -67,7 +68,7 @@ const OFF_TIME: Duration = Duration::from_millis(500);
 #[derive(Serialize)]
 struct Recovered {
     recovered: bool,
-    /// What was wrong before.
+    /// The problems before the recovery.
     before: Vec<String>,
     status: ArmStatus,
 }
@@ -104,7 +105,7 @@ pub(crate) fn run(session: &mut Session, args: &RecoverArgs) -> Result<(), Comma
     }
 }
 
-/// Step 1.
+/// Step 1 of the help text: shows each problem and what to do.
 fn tell(health: &Health) {
     for problem in health.problems() {
         warn(problem);
@@ -115,7 +116,7 @@ fn tell(health: &Health) {
     }
 }
 
-/// Steps 2 and 3.
+/// Steps 2 and 3: asks, then switches the motors on.
 fn recover(arm: &mut Arm, before: &Health, yes: bool) -> Result<(), CommandError> {
     put_right(arm)?;
     if before.is_driven() && before.problems().iter().all(|problem| !needs_motors(problem.kind)) {
@@ -149,7 +150,8 @@ fn recover(arm: &mut Arm, before: &Health, yes: bool) -> Result<(), CommandError
 }
 
 /// Writes the measured position of each blocked joint as its target: a new target lets it hold there (D27). A joint that let go
-/// engages by itself (D28). The others keep their targets: a loaded joint would sink a little below its measured position.
+/// engages by itself (D28). The others keep their targets: a loaded joint would sink a little if its measured position became
+/// its target.
 fn free_blocked_joints(arm: &mut Arm, health: &Health) -> Result<(), CommandError> {
     let mut targets = [None; 7];
     for (target, joint) in targets.iter_mut().zip(&health.joints) {
@@ -166,12 +168,12 @@ const fn needs_motors(kind: ProblemKind) -> bool {
     kind.ends_moves() || kind.is_alarm() || matches!(kind, ProblemKind::ServoBus)
 }
 
-/// Is it useless or harmful to switch the motors on?
+/// Does the problem make it useless or harmful to switch the motors on?
 const fn prevents_motors(kind: ProblemKind) -> bool {
     matches!(kind, ProblemKind::NoServoAnswers | ProblemKind::Overheat | ProblemKind::Voltage)
 }
 
-/// The health once servos answer, or after a time.
+/// The health once a servo answers, or after [`ANSWER_TIMEOUT`].
 fn wait_for_servos(arm: &mut Arm) -> Result<Health, CommandError> {
     let deadline = arm.now() + ANSWER_TIMEOUT;
     loop {

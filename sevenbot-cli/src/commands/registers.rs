@@ -73,7 +73,7 @@ fn versions(row: &Register) -> Vec<&'static str> {
     table::versions(row).collect()
 }
 
-/// An array in one line, with an object per row.
+/// A JSON array on one line, with one object per row.
 fn json() -> String {
     let rows: Vec<Value> = table::rows().map(object).collect();
     let text = serde_json::to_string(&rows).unwrap_or_default();

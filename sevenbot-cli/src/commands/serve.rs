@@ -114,7 +114,7 @@ pub(crate) struct ServeArgs {
     read_only: bool,
 }
 
-/// The longest path of a Unix socket that every system takes.
+/// The longest path of a Unix socket, in bytes, that every system accepts.
 const LONGEST_PATH: usize = 100;
 
 /// Where programs can connect.
@@ -144,13 +144,13 @@ pub(crate) fn run(session: &mut Session, args: &ServeArgs) -> Result<(), Command
     run_server(server, &stop, local.as_ref())
 }
 
-/// Opens a server, with its Unix socket, by `open`.
+/// Catches Ctrl-C, then opens the server by `open`, with the Unix socket of `local`.
 pub(super) fn open_server(
     config: ServerConfig,
     local: Option<&LocalServer>,
     open: impl FnOnce(ServerConfig) -> Result<Server, StartError>,
 ) -> Result<(Server, Stop), CommandError> {
-    // Before the links are created: Ctrl-C has to remove them.
+    // Catch Ctrl-C before the links are created: it has to remove them.
     let stop = stop_signal()?;
     let config = ServerConfig { socket: local.map(|local| local.socket.clone()), ..config };
     let server = open(config).map_err(|error| CommandError::Arm(error.to_string()))?;
@@ -173,7 +173,8 @@ pub(super) fn run_server(
     ended.map_err(|error| CommandError::Arm(format!("the operating system failed: {error}")))
 }
 
-/// The Unix socket, and what other programs learn of the server. `None` if this user has no private directory for it.
+/// The Unix socket and the name of the server, for other programs of this user. `None` if this user has no private directory
+/// for it.
 fn local(args: &ServeArgs) -> Option<LocalServer> {
     let name = args.name.clone();
     match &args.socket {
@@ -182,7 +183,7 @@ fn local(args: &ServeArgs) -> Option<LocalServer> {
     }
 }
 
-/// The usual Unix socket.
+/// The Unix socket in the user's runtime directory; `None` if there is no such directory or the path is too long.
 pub(super) fn default_local(name: Option<String>) -> Option<LocalServer> {
     LocalServer::of_this_process(name).filter(|local| local.socket.as_os_str().len() <= LONGEST_PATH)
 }
@@ -241,7 +242,7 @@ fn config(session: &Session, args: &ServeArgs) -> Result<ServerConfig, CommandEr
     })
 }
 
-/// The token of the command line, or of its file.
+/// The token from the command line or the token file; `None` if neither is given.
 fn token(args: &ServeArgs) -> Result<Option<String>, CommandError> {
     let token = match &args.token_file {
         None => args.token.clone(),
@@ -263,7 +264,7 @@ fn name(text: &str) -> Result<String, &'static str> {
     if network::is_name(text) { Ok(text.to_owned()) } else { Err(network::NAME_RULE) }
 }
 
-/// A port from the command line is kept. Otherwise the arm is searched again each time it was unplugged.
+/// The location of the arm: the port from the command line only, or a search for the arm each time it was unplugged.
 pub(super) fn location(session: &Session) -> Result<ArmLocation, CommandError> {
     let first = session.own_port_name()?;
     if simulated_port(&first).is_some() {
@@ -275,7 +276,7 @@ pub(super) fn location(session: &Session) -> Result<ArmLocation, CommandError> {
     Ok(if session.port.is_some() { ArmLocation::Port(first) } else { ArmLocation::Search { first, list } })
 }
 
-/// Fails if another program has the arm's port open. A port that does not exist yet is waited for.
+/// Fails if another program has the arm's port open. A port that does not exist yet is no error: the server waits for it.
 pub(super) fn check_not_busy(arm: &ArmLocation, baud: u32) -> Result<(), CommandError> {
     let (ArmLocation::Port(path) | ArmLocation::Search { first: path, .. }) = arm;
     let port = path.display().to_string();

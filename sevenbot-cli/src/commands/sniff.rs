@@ -34,9 +34,9 @@ pub(crate) struct SniffArgs {
     file: Option<PathBuf>,
 }
 
-/// The first words of a log are within this many bytes.
+/// Bytes at the start of a file that are enough to recognize a log.
 const LONGEST_HEAD: u64 = 64;
-/// An empty line for this time ends an unfinished frame (D4).
+/// An idle line ends an unfinished frame after this time (D4).
 const GAP: Duration = Duration::from_millis(100);
 
 pub(crate) fn run(session: &mut Session, args: &SniffArgs) -> Result<(), CommandError> {
@@ -58,7 +58,7 @@ fn is_log_file(path: &Path) -> Result<bool, CommandError> {
     Ok(wire_log::is_log(&start))
 }
 
-/// A log of `--log`, or a recorded session: each direction by itself, with its times.
+/// Prints a log of `--log` or a session of `host-sim --record`, with times. Parses each direction separately.
 fn log(printer: &mut Printer, path: &Path) -> Result<(), CommandError> {
     let text = fs::read_to_string(path).map_err(|error| CommandError::file(path, error))?;
     let entries = wire_log::entries(&text).map_err(|line| {
@@ -122,7 +122,7 @@ fn port(session: &mut Session) -> Result<(), CommandError> {
 
 #[derive(Serialize)]
 struct TrafficLine {
-    /// Since the start; none for a file.
+    /// Since the start of the capture or of the log; `None` for a file of raw bytes, which has no times.
     seconds: Option<f64>,
     kind: &'static str,
     address: Option<u8>,

@@ -83,7 +83,7 @@ fn engage(arm: &mut Arm) -> Result<(), CommandError> {
     Ok(engaged?)
 }
 
-/// Without an answer it is unknown whether a motor is off.
+/// Warns about joints without an answer: it is unknown whether their motors are off.
 fn warn_about_silent_joints(arm: &mut Arm) -> Result<(), CommandError> {
     let silent = arm.joints()?.missing();
     if silent != 0 {

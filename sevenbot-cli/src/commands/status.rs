@@ -80,7 +80,7 @@ struct JointLine {
     is_bad: bool,
 }
 
-/// A problem, and what to do.
+/// A problem and its remedy.
 #[derive(Debug, Serialize)]
 pub(crate) struct ProblemText {
     kind: &'static str,
@@ -175,7 +175,7 @@ impl Printable for ArmStatus {
     }
 }
 
-/// Each problem, and below it what to do.
+/// Writes each problem, with its remedy below it.
 fn write_problems(out: &mut dyn Write, problems: &[ProblemText]) -> io::Result<()> {
     if problems.is_empty() {
         return writeln!(out, "{GOOD}nothing needs attention{GOOD:#}");

@@ -39,7 +39,7 @@ pub(crate) struct StopArgs {
     all: bool,
 }
 
-/// With `--all` most ports may lead to something else. An arm answers sooner.
+/// The longest reply timeout with `--all`, where most ports may lead to other devices. An arm answers sooner.
 const PATIENCE: Duration = Duration::from_millis(500);
 
 const NO_STOP: &str =
@@ -73,14 +73,14 @@ impl Printable for Stopped {
     }
 }
 
-/// What became of the stop of an arm, and its port.
+/// The result of stopping an arm, and the port of the arm.
 type Outcome = (Result<JointSnapshot, CommandError>, String);
 
 /// Stops all arms at the same time. The ports that a server holds are stopped through the server.
 fn stop_all(session: &mut Session) -> Result<(), CommandError> {
     let served: Vec<_> = network::servers().iter().map(network::LocalServer::address).collect();
     let simulators = running_simulators();
-    // Another port need not lead to an arm.
+    // Any other port may lead to another device, so it may fail to open.
     let is_arm = |port: &String| served.iter().chain(&simulators).chain(&session.port).any(|arm| arm == port);
     let mut failed: Option<CommandError> = None;
     let (mut has_stopped, mut tried) = (false, Vec::new());
@@ -105,7 +105,8 @@ fn stop_all(session: &mut Session) -> Result<(), CommandError> {
     failed.map_or(Ok(()), Err)
 }
 
-/// Stops each arm in a thread of its own, and waits for all: no arm goes on because the outcome of another cannot be printed.
+/// Stops each arm in a thread of its own, and waits for all threads. The caller prints afterwards, so that an output error
+/// keeps no arm from being stopped.
 fn stop_each(session: &Session, served: &[String], simulators: &[String]) -> Vec<Outcome> {
     let listed = ports::available().into_iter().map(|port| port.name);
     let free = |port: &String| network::serving(port).is_none();
@@ -124,7 +125,7 @@ fn stop_each(session: &Session, served: &[String], simulators: &[String]) -> Vec
     threads.into_iter().filter_map(|thread| thread.join().ok()).collect()
 }
 
-/// A port with the path behind its links. Two threads that open one port under two names would keep each other from the arm.
+/// The port, with its canonical path as the key. So a port with two names is opened once: two threads would find it busy.
 fn by_path(port: String) -> (PathBuf, String) {
     (fs::canonicalize(&port).unwrap_or_else(|_| PathBuf::from(&port)), port)
 }

@@ -14,7 +14,7 @@ use crate::printer::note;
 use crate::secret::new_secret;
 use crate::session::Session;
 
-/// The port that is tried first. A browser keeps its permissions and settings for each port.
+/// The default port. It should be the same each time, because a browser keeps permissions and settings per port.
 const USUAL_PORT: u16 = 7780;
 
 /// Show and move the arm in a browser.

@@ -110,7 +110,7 @@ fn a_second_ctrl_c_ends_the_program_at_once() {
             Vec::new()
         }
         Request::Read { address: 0, .. } => reply(0, &IDENTITY),
-        // All registers are 1: the servo state. But no joint is blocked, let go or silent, there is a supply, and no server.
+        // Every register reads 1, so the motor state is servo. The registers that report problems or a server read 0.
         Request::Read { address, count } => {
             let is_problem = |address: u8| matches!(address, 195..=198 | 232..=239 | 242);
             let values = (address..=u8::MAX).take(count.into()).map(|address| u8::from(!is_problem(address)));

@@ -1,4 +1,5 @@
-//! What becomes of a request: queued, dropped, or a stop, which ends what waits and what the others stream.
+//! Queues or drops each request of a client. A stop also drops the motion that waits, and ends the streams of the other
+//! clients.
 
 use host_link::sharing::Command;
 use protocol_core::time::Instant;
@@ -10,22 +11,23 @@ use super::drive::MayNotMove;
 use super::intent::Intent;
 use super::request::WholeRequest;
 
-/// What becomes of a request.
+/// The result of handing over a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Admission {
-    /// It waits for its turn.
+    /// The request waits for its turn.
     Queued,
-    /// The client has too many requests: it is dropped.
+    /// The request is dropped: the client has too many.
     NoRoom,
-    /// There is no arm: it is dropped, unless it reads the server's own registers.
+    /// No arm answers: the request is dropped. A read of the server's own registers still gets a reply, and a stop is still
+    /// sent to an arm that fell silent.
     NoArm,
-    /// It waits for its turn, and then writes nothing but the client's own registers.
+    /// The server is read-only: the request waits for its turn, and then writes only the client's own registers.
     ReadOnly,
-    /// It is dropped: another client stopped the arm, and this one has not started anew.
+    /// The request is dropped: another client stopped the arm, and this one has not started anew.
     Stopped,
-    /// It is dropped: another client drives.
+    /// The request is dropped: another client drives.
     AnotherDrives,
-    /// It is dropped: it came too late.
+    /// The request is dropped: it may have been sent [`LONGEST_WAIT`] ago or earlier.
     Late,
 }
 
@@ -67,7 +69,7 @@ impl Hub {
         Admission::Queued
     }
 
-    /// Stops the arm for a client, as 1 in register 239 does. [`Hub::hold_outcome`] tells what came of it.
+    /// Stops the arm for a client, as 1 in register 239 does. [`Hub::hold_outcome`] has the outcome.
     pub fn stop_arm(&mut self, now: Instant, id: ClientId) -> Admission {
         if !self.has_arm() && !self.is_silent() {
             return Admission::NoArm;
@@ -79,14 +81,15 @@ impl Hub {
         Admission::Queued
     }
 
-    /// Would a stop end this request of a client, if it waited?
+    /// Would a stop drop this request of a client if it waited in the queue?
     #[must_use]
     pub fn moves_arm(&self, now: Instant, id: ClientId, request: &WholeRequest) -> bool {
         let meaning = self.clients.get(&id).map(|client| client.meaning(now, request, &self.known));
         meaning.and_then(|(intent, _)| intent).is_some_and(Intent::is_ended_by_stop)
     }
 
-    /// No arm answers. If perhaps only the replies of a silent one are lost, it is stopped, or its motors are switched off.
+    /// Handles a request while no arm answers. A silent arm may still receive frames, so it is stopped, or its motors are
+    /// switched off, if the request asks for that.
     fn request_without_arm(
         &mut self,
         now: Instant,
@@ -121,7 +124,8 @@ impl Hub {
         self.news.insert(id);
     }
 
-    /// A request comes too late. The targets of a late stop would move the arm, so the hub holds it where it is.
+    /// Drops a request that comes too late. The targets of a late stop or hold would move the arm, so the hub holds the arm
+    /// itself.
     fn refuse_late(&mut self, now: Instant, id: ClientId, intent: Intent) -> Admission {
         if intent.is_urgent() {
             self.obey(now, id, Command::Stop);
@@ -156,7 +160,7 @@ impl Hub {
         })
     }
 
-    /// A client stops the arm: what moves it is dropped, and what the others stream ends.
+    /// Notes that a client stops the arm: drops the waiting motion of all clients, and ends the streams of the others.
     fn stop(&mut self, now: Instant, by: ClientId) {
         self.stops = self.stops.wrapping_add(1);
         self.driver.end(None);

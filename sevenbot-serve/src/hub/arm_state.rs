@@ -25,7 +25,7 @@ impl Hub {
         self.presence.is_watched = true;
     }
 
-    /// Does the arm perhaps get what is sent to it, although it answers no more?
+    /// Has the arm stopped answering although its port is open? It may still receive what is sent to it.
     #[must_use]
     pub const fn is_silent(&self) -> bool {
         matches!(self.arm, ArmState::Silent(_))
@@ -37,19 +37,19 @@ impl Hub {
         self.arm == ArmState::Present
     }
 
-    /// From now on only this arm counts, by its chip id.
+    /// From now on only the present arm is accepted, by its chip id.
     pub fn expect_same_arm(&mut self) {
         self.chip_id = Some(self.known.chip_id().to_vec());
     }
 
-    /// The arm answers no more. Nothing is kept for it but a hold.
+    /// The arm no longer answers. Drops everything that waits for it, except a hold in progress.
     pub(super) fn lose_arm(&mut self, now: Instant) {
         self.arm = ArmState::Silent(now);
         self.line.end_reads();
         self.drop_requests();
     }
 
-    /// Asks what is behind the port, or whether the arm still answers, if that is due.
+    /// If a question is due, asks which device is behind the port, or whether the arm still answers.
     pub(super) fn ask_arm(&mut self, now: Instant) {
         let due = self.question_due();
         if now < due || !self.line.is_free(now) {
@@ -75,7 +75,8 @@ impl Hub {
         }
     }
 
-    /// An unknown device answered, or a 7Bot V2. A stream that an earlier program left running ends.
+    /// Processes the identity that a device answered, and ignores a device that is no 7Bot V2. Switches off the reports that an
+    /// earlier program left running.
     pub(super) fn identify(&mut self, now: Instant, values: &[u8]) {
         let Some(known) = KnownRegisters::of_arm(values) else { return };
         let is_wanted = self.chip_id.as_deref().is_none_or(|id| known.chip_id() == id);

@@ -24,11 +24,12 @@ pub const LONGEST_WAIT: Duration = Duration::from_millis(200);
 const MOST_REPORTS: usize = 4;
 /// Bytes on the line, replies included, that may wait for a client: 90 ms at 115 200 baud. One request is always allowed.
 const MOST_WAITING_BYTES: usize = 1_024;
-/// A client may send this many stops in each period. More wait like other requests, so that a flood delays no other client.
+/// A client may send this many urgent requests in each period. More wait like other requests, so that a flood delays no other
+/// client.
 const MOST_URGENT: u8 = 4;
 const URGENT_PERIOD: Duration = Duration::from_millis(100);
 
-/// What the hub has for a client.
+/// An event of the hub for a client.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Event {
     /// The reply to the client's oldest read.
@@ -59,7 +60,7 @@ pub enum Event {
 pub(crate) struct Waiting {
     pub(crate) request: WholeRequest,
     pub(crate) intent: Intent,
-    /// When it came.
+    /// The earliest time at which it can have been sent.
     pub(crate) since: Instant,
 }
 
@@ -67,7 +68,7 @@ pub(crate) struct Waiting {
 #[derive(Debug, Default)]
 pub(crate) struct Client {
     pub(crate) waiting: VecDeque<Waiting>,
-    /// Stops, which go before everything else.
+    /// Holds, stops, and writes that switch the motors off. They go before everything else.
     pub(crate) urgent: VecDeque<Waiting>,
     /// When the current period of urgent requests began, and how many there were in it.
     urgent_period: (Instant, u8),
@@ -94,8 +95,8 @@ impl Client {
         self.left.is_none() && self.waiting.len() < MOST_WAITING && bytes < MOST_WAITING_BYTES
     }
 
-    /// What a request means for the arm's motion, if it is a write, and the command to the server in it.
-    /// A write that the arm refuses has no effect.
+    /// The intent of a write (`None` for a read), and the command to the server that it contains. A write that the arm refuses
+    /// has no effect, and counts as a setting.
     pub(crate) fn meaning(
         &self,
         now: Instant,
@@ -116,7 +117,7 @@ impl Client {
         }
     }
 
-    /// Queues a request. A stop goes before the others.
+    /// Queues a request. An urgent one goes before the others.
     pub(crate) fn queue(&mut self, now: Instant, waiting: Waiting) {
         if waiting.intent.is_urgent() && self.may_be_urgent(now) {
             self.urgent.push_back(waiting);
@@ -134,7 +135,7 @@ impl Client {
         *count <= MOST_URGENT
     }
 
-    /// Is its next request a read of these registers, which can be sent?
+    /// Is its next request a read of these registers that can be sent now?
     pub(crate) fn waits_to_read(&self, address: u8, count: u8) -> bool {
         let next = self.waiting.front().map(|waiting| &waiting.request);
         self.can_receive && self.unanswered == 0 && next == Some(&WholeRequest::Read { address, count })
@@ -166,7 +167,7 @@ impl Client {
         }
     }
 
-    /// It closed its connection: only its writes are left, and nobody waits for a reply.
+    /// The client closed its connection: keeps only its writes, because replies can no longer be delivered.
     pub(crate) fn leave(&mut self, now: Instant) {
         self.left = Some(now);
         self.own = OwnRegisters::default();
@@ -176,18 +177,18 @@ impl Client {
         self.waiting.retain(|waiting| matches!(waiting.request, WholeRequest::Write { .. }));
     }
 
-    /// Did it close its connection, and is nothing left to carry out?
+    /// Can the client be removed? It closed its connection, and has nothing left to carry out, or left [`LONGEST_WAIT`] ago.
     pub(crate) fn has_left(&self, now: Instant) -> bool {
         let is_idle = self.waiting.is_empty() && self.urgent.is_empty();
         self.left.is_some_and(|left| is_idle || now - left >= LONGEST_WAIT)
     }
 
-    /// A stop: drops what moves the arm, but no hold. Returns whether there was something.
+    /// Drops the waiting requests that a stop ends; holds are kept. Returns whether there were any.
     pub(crate) fn drop_motion(&mut self) -> bool {
         self.drop_where(|waiting| waiting.intent.is_ended_by_stop())
     }
 
-    /// Drops what has waited too long. Returns whether there was something.
+    /// Drops the requests that have waited too long. Returns whether there were any.
     pub(crate) fn drop_stale(&mut self, now: Instant) -> bool {
         self.drop_where(|waiting| waiting.intent.must_be_fresh() && now - waiting.since >= LONGEST_WAIT)
     }
@@ -207,7 +208,7 @@ impl Client {
         self.waiting.len() != before
     }
 
-    /// A request is not carried out. Its reads get no reply.
+    /// Counts a dropped write, or queues [`Event::NoReply`] for each read of a dropped request.
     pub(crate) fn refuse(&mut self, request: &WholeRequest) {
         let (reads, (address, count)) = match request {
             WholeRequest::Read { address, count } => (1, (*address, *count)),

@@ -1,4 +1,5 @@
-//! From the line to the clients: each reply to the client that asked, with the registers that are not the arm's.
+//! From the line to the clients: each reply to the client that asked, with the server's values in the registers that the server
+//! keeps.
 
 use host_link::sharing::{self, DrivenBy, SharingState};
 use protocol_core::registers::map::{FAULTS, fault};
@@ -43,7 +44,7 @@ impl Hub {
         }
     }
 
-    /// Overwrites in a reply the registers whose values the server keeps, not the arm.
+    /// Overwrites the registers of a reply whose values the server keeps instead of the arm.
     fn overlay(&self, now: Instant, id: ClientId, address: u8, values: &mut [u8]) {
         if let Some(faults) = byte_at(address, values, &FAULTS).filter(|_| self.known.is_ours()) {
             *faults |= if self.watchdog.has_acted() { fault::HOST_SILENT } else { 0 };
@@ -67,7 +68,7 @@ impl Hub {
         })
     }
 
-    /// What the registers of the server tell a client.
+    /// The values of the server's registers for a client.
     fn sharing_state(&self, now: Instant, id: ClientId, client: &Client) -> SharingState {
         let clients = self.clients.values().filter(|client| client.left.is_none()).count();
         SharingState {

@@ -1,7 +1,8 @@
-//! Who drives the arm, and who may.
+//! Which client drives the arm, and which ones may.
 //!
-//! A client drives while it writes targets, until it has written none for a second. A stop ends what the others stream: their
-//! targets are dropped until they start anew, that is after a second without a target, or by a command.
+//! A client drives while it writes targets, until it has written none for a second. A stop ends the streams of the other
+//! clients: their targets are dropped until they start anew. They do so by a pause of a second without a target, or by a
+//! command.
 
 use protocol_core::time::{Duration, Instant};
 
@@ -10,12 +11,12 @@ use super::client_id::ClientId;
 /// A client that has written no target for this long does not drive any more, and starts anew with its next one.
 pub(crate) const PAUSE: Duration = Duration::from_millis(1_000);
 
-/// What a client has done to the arm's motion.
+/// The history of a client as a source of motion.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Driving {
     /// When it wrote a target last, carried out or not.
     last_motion: Option<Instant>,
-    /// A stop of another client ended what it streams.
+    /// A stop of another client ended its stream.
     is_stopped: bool,
 }
 
@@ -54,7 +55,7 @@ pub(crate) enum MayNotMove {
     AnotherDrives,
 }
 
-/// Who drives the arm.
+/// The client that drives the arm.
 #[derive(Debug, Default)]
 pub(crate) struct Driver {
     /// The client that wrote a target last, and when.
@@ -64,7 +65,7 @@ pub(crate) struct Driver {
 }
 
 impl Driver {
-    /// Nobody drives. `is_exclusive`: only one client drives at a time.
+    /// No client drives yet. `is_exclusive`: only one client drives at a time.
     pub(crate) const fn new(is_exclusive: bool) -> Self {
         Self { last: None, is_exclusive }
     }
@@ -74,7 +75,7 @@ impl Driver {
         self.last.filter(|&(_, at)| now - at < PAUSE).map(|(id, _)| id)
     }
 
-    /// A client writes a target, or switches something.
+    /// Checks whether a client may write a target or switch something now. If so, the client drives.
     pub(crate) fn check(
         &mut self,
         now: Instant,

@@ -1,15 +1,15 @@
 //! The targets that hold joints: the last write of a target to such a joint was a stop or a hold.
 //!
-//! A joint that was stopped brakes past its target and returns to it. The server must not hold it again where it is measured
-//! meanwhile: the arm would rest elsewhere than where a stop was confirmed.
+//! A joint that was stopped brakes past its target and returns to it. Meanwhile the server must not hold it at its measured
+//! position: the arm would come to rest at another position than the confirmed one.
 
 use protocol_core::registers::Joint;
 
 use super::angles::Angles;
 use super::intent::Intent;
 
-/// A joint may be so far from the target that holds it, in hundredths of a degree. One that is farther away is not braking: the
-/// program that held it read its position long before.
+/// The longest distance of a braking joint from the target that holds it, in hundredths of a degree. A joint that is farther
+/// away is not braking: the program that held it read its position long before.
 const LONGEST_BRAKING: u16 = 1_500;
 
 /// The targets that hold joints; `None`: the joint does not hold.

@@ -6,9 +6,9 @@
 //!     └─▶ a reply: the steps of the hold ──▶ the arm holds ──▶ restore period and speeds, until they are read back
 //! ```
 //!
-//! Where the arm has to hold depends on a reply, and replies may be lost. So all joints are slowed down before the first
-//! one. The hub knows the speeds also if that of the speeds is lost: it read them when it found the arm, and all writes pass
-//! through it.
+//! The hub needs a reply to know where the arm has to hold, and replies may be lost. So it slows all joints down before the
+//! first reply. If the reply with the speeds is lost, the hub still knows them: it read them when it found the arm, and all
+//! writes pass through it.
 
 use protocol_core::registers::map::{MOTOR_STATE, SET_POINT_PERIOD, SPEED, motor_state};
 use protocol_core::registers::{JOINTS, Map};
@@ -39,7 +39,7 @@ pub enum HoldOutcome {
 }
 
 impl Hub {
-    /// Holds the arm; after the hold in progress, if that still slows the joints down.
+    /// Begins to hold the arm. If a hold is in progress and does not restore yet, another one follows it instead.
     pub(super) fn start_hold(&mut self) {
         self.hold_outcome = None;
         if let Some(hold) = self.hold.as_mut().filter(|hold| hold.restoring().is_none()) {
@@ -50,13 +50,13 @@ impl Hub {
         self.hold = Some(ArmHold::new(self.known.is_ours(), is_streaming));
     }
 
-    /// Is the hub about to hold the arm by itself?
+    /// Is a hold of the hub in progress?
     #[must_use]
     pub const fn is_holding(&self) -> bool {
         self.hold.is_some()
     }
 
-    /// What came of the last hold of the hub; `None`: nothing yet.
+    /// The outcome of the last hold of the hub; `None`: it has not ended, or there was none.
     #[must_use]
     pub const fn hold_outcome(&self) -> Option<HoldOutcome> {
         self.hold_outcome
@@ -102,19 +102,20 @@ impl Hub {
         self.line.send_read(now, Owner::Hold, address, count);
     }
 
-    /// The speeds directly before a brake. The hub does not notice each restart of the arm, so its own may be out of date.
+    /// Notes the speeds that were read directly before a brake. The speeds in `known` may be out of date, because the hub does
+    /// not notice each restart of the arm.
     pub(super) fn note_speeds(&mut self, found: &[u8]) {
         let speeds = restored(found, self.known.speeds());
         self.known.set_speeds(&speeds);
     }
 
-    /// Writes registers by itself.
+    /// Writes registers for the hub itself, and notes them in `known`.
     fn write_arm(&mut self, now: Instant, address: u8, values: &[u8]) {
         self.known.write(Map::V22, address, values);
         self.line.send_write(now, Map::V22, address, values);
     }
 
-    /// Takes a reply for the hold in progress. Other reads of it may be on their way: they show an older state.
+    /// Takes a reply for the hold in progress. Cancels its other pending reads, whose replies show an older state.
     pub(super) fn continue_hold(&mut self, now: Instant, address: u8, values: &[u8]) {
         let Some(mut hold) = self.hold.take() else { return };
         self.line.cancel_reads(Owner::Hold);
@@ -136,7 +137,8 @@ impl Hub {
         }
     }
 
-    /// Writes the targets that hold the arm. A set-point period would delay them; the maker's firmware has none.
+    /// Writes the targets that hold the arm. A set-point period would delay them, so it is 0 meanwhile. The maker's firmware
+    /// has no period.
     fn write_targets(&mut self, now: Instant, frames: &[Frame]) {
         let period = self.known.word(SET_POINT_PERIOD.address);
         let is_delayed = !frames.is_empty() && period != 0 && self.known.is_ours();
@@ -153,7 +155,7 @@ impl Hub {
         }
     }
 
-    /// The arm holds: restores what the hold changed, until a reply shows it.
+    /// The arm holds: restores what the hold changed, until a reply confirms it.
     fn restore(&mut self, now: Instant, mut hold: ArmHold, what: Restoring, address: u8, values: &[u8]) {
         let frames = match what {
             Restoring::Period => self.period_to_restore(values),
@@ -189,7 +191,8 @@ impl Hub {
         (found != wanted).then(|| (SET_POINT_PERIOD.address, wanted.to_vec())).into_iter().collect()
     }
 
-    /// The speeds of joints that have that of the brake. The others are not written: a client may have written them since.
+    /// The frames that restore the speeds of the joints that still have the speed of the brake. A client may have written the
+    /// other speeds since.
     fn speeds_to_restore(&self, address: u8, values: &[u8]) -> Vec<Frame> {
         let found = (address..=u8::MAX).zip(values).filter(|(register, _)| SPEED.holds(*register));
         let is_slow =
@@ -197,7 +200,8 @@ impl Hub {
         joined(is_slow.map(|(register, _)| (register, vec![self.known.byte(register)])))
     }
 
-    /// Replaces what a hold changes for a while in a reply to a client: a client that remembers it would restore it later.
+    /// Replaces the temporary values of a hold in a reply to a client by those from before. Otherwise a client that remembers
+    /// them would restore them later.
     pub(super) fn overlay_changed(&self, address: u8, values: &mut [u8]) {
         if self.hold.is_none() {
             return;
@@ -230,7 +234,7 @@ impl Hub {
     }
 }
 
-/// What came of a hold whose last reply has the motor state.
+/// The outcome of a hold, from its last reply, which has the motor state.
 fn outcome(hold: &ArmHold, address: u8, values: &[u8]) -> HoldOutcome {
     let place = MOTOR_STATE.address.checked_sub(address).map(usize::from);
     match place.and_then(|place| values.get(place)) {
@@ -240,8 +244,8 @@ fn outcome(hold: &ArmHold, address: u8, values: &[u8]) -> HoldOutcome {
     }
 }
 
-/// The speeds without the brake. A joint that was found with another speed did not get the brake, got a speed of a client since, or
-/// belongs to an arm that restarted.
+/// The speeds without the brake. A joint with another speed keeps it: it did not get the brake, got a speed of a client since,
+/// or belongs to an arm that restarted.
 fn restored(found: &[u8], before: &[u8]) -> Vec<u8> {
     let rows = found.iter().zip(before);
     rows.map(|(&found, &before)| if found == BRAKE { before } else { found }).collect()

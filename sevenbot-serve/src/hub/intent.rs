@@ -1,4 +1,4 @@
-//! What a write does to the arm's motion. It decides whether the write may wait, and who may send it.
+//! What a write does to the arm's motion. The intent decides whether the write may wait, and who may send it.
 
 use protocol_core::registers::map::{FINE_TARGET, MOTOR_STATE, TARGET_POSITION, VACUUM_PUMP, motor_state};
 use protocol_core::registers::map21::{DISC_DIRECTION, TIP_POSITION, WRIST_POSITION};
@@ -20,9 +20,9 @@ pub(crate) enum Intent {
     Switch,
     /// It moves joints.
     Motion,
-    /// It holds joints where its client has read that they are.
+    /// It holds joints: their targets are the positions that its client has read.
     Hold,
-    /// It holds so many joints there that it is a stop of the arm.
+    /// As `Hold`, with at least [`STOP_JOINTS`] joints, so it is a stop of the arm.
     Stop,
     /// It switches the motors off.
     MotorsOff,
@@ -66,7 +66,7 @@ impl Intent {
         matches!(self, Self::Hold | Self::Stop)
     }
 
-    /// Does it end what others stream?
+    /// Does it end the streams of other clients?
     pub(crate) const fn ends_streams(self) -> bool {
         matches!(self, Self::Stop | Self::MotorsOff)
     }

@@ -1,8 +1,8 @@
-//! The arm's registers as the hub knows them without a read: the EEPROM lock and register 20, which decide which writes
-//! the arm refuses, and how it shows offsets before a write; and the speeds, which a hold restores.
+//! The registers of the arm that the hub knows without a read. The EEPROM lock and register 20 decide which writes the arm
+//! refuses, and how it shows offsets before a write. A hold restores the speeds.
 //!
-//! They are read when the arm is found. After that only the hub writes to the arm. Full settings storage is
-//! unknown here, and so is a restart of the controller, which locks the EEPROM.
+//! They are read when the arm is found. After that only the hub writes to the arm. The hub does not know whether the settings
+//! storage is full, nor whether the controller restarted, which locks the EEPROM.
 
 use motion_core::reach;
 use protocol_core::registers::map::{
@@ -44,7 +44,7 @@ impl KnownRegisters {
         self.0.read(CHIP_ID.address, CHIP_ID.count)
     }
 
-    /// Has the arm the extended block and the status block?
+    /// Does the arm have the extended block and the status block?
     pub(crate) fn is_ours(&self) -> bool {
         self.0.get(FIRMWARE_VERSION.address) == FIRMWARE_VERSION.default_at(FIRMWARE_VERSION.address)
     }
@@ -54,12 +54,12 @@ impl KnownRegisters {
         self.0.get(WATCHDOG_ACTION.address) != 0
     }
 
-    /// The speeds of all joints. A brake of the hub is not among them.
+    /// The speeds of all joints, without the hub's brake.
     pub(crate) fn speeds(&self) -> &[u8] {
         self.0.read(SPEED.address, SPEED.count)
     }
 
-    /// These are the speeds that a hold restores.
+    /// Sets the speeds that a hold restores.
     pub(crate) fn set_speeds(&mut self, speeds: &[u8]) {
         (SPEED.address..).zip(speeds).for_each(|(address, &speed)| self.0.set(address, speed));
     }
@@ -79,7 +79,7 @@ impl KnownRegisters {
         self.check(map, address, values).is_some()
     }
 
-    /// The arm got a write. A refused one has no effect.
+    /// Notes a write to the arm. A write that the arm refuses has no effect.
     pub(crate) fn write(&mut self, map: Map, address: u8, values: &[u8]) {
         if let Some(accepted) = self.check(map, address, values) {
             self.0.apply(&accepted);

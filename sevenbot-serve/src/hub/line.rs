@@ -15,19 +15,19 @@ use super::client_id::ClientId;
 use super::request::{WholeRequest, reply_bytes};
 use protocol_core::report_kind::ReportKind;
 
-/// What a client waits for. A reply that is late is asked for again after 100 ms or more, unless something was written since:
-/// a lost frame costs its client, and those that wait for the line, no more than that. The end is late, because a computer that
-/// is busy may not run the arm's side of the port for a second.
+/// For reads of clients. If a reply is late, the read is repeated after 100 ms or more, unless something was written since. So
+/// a lost frame delays its client, and those that wait for the line, only by that time. The read is given up after 3 s only,
+/// because a busy computer may not run the arm's side of the port for a second.
 const CLIENT_PATIENCE: Patience = Patience { attempts: 3, timeout: Duration::from_millis(1_000) };
-/// For the reads of a hold: it sends another one every 100 ms, behind the brake. Each of them may be answered for a second.
+/// For reads of a hold, which sends another one every 100 ms, after the brake. The reply to each may come within 1 s.
 const HOLD_PATIENCE: Patience = Patience { attempts: 10, timeout: Duration::from_millis(100) };
-/// What the hub asks for itself, and asks again in time.
+/// For the other reads of the hub, which the hub itself repeats.
 const OWN_PATIENCE: Patience = Patience { attempts: 1, timeout: Duration::from_millis(1_000) };
 /// The line may be filled this far ahead, so that it is not idle while the program wakes up.
 const AHEAD: Duration = Duration::from_millis(1);
 /// Bytes that may wait for the port.
 const MOST_OUTPUT: usize = 64;
-/// With so many bytes the port does not take what is written: a hold that is repeated all the time adds nothing.
+/// If this many bytes wait, the port counts as stuck. A hold that repeats its frames then adds no more.
 const STUCK_OUTPUT: usize = 1_024;
 /// Bytes of replies that may be on their way. One read is always allowed.
 const WINDOW: usize = 96;
@@ -68,7 +68,7 @@ impl Owner {
 pub(crate) struct Line {
     link: HostLink,
     output: Vec<u8>,
-    /// The owners of the reads without an end. Clients may share a read.
+    /// The owners of the pending reads. Clients may share a read.
     owners: BTreeMap<RequestId, Vec<Owner>>,
     events: VecDeque<(Owner, Event)>,
 }
@@ -76,7 +76,7 @@ pub(crate) struct Line {
 impl Line {
     /// `may_report`: the arm may send reports that an earlier program asked for.
     pub(crate) fn new(baud: u32, may_report: bool) -> Self {
-        // The hub switches reports off, and samples the arm itself.
+        // Otherwise the hub switches reports off, and samples the arm itself.
         let reports = if may_report { REPORTS } else { &[] };
         let link = HostLink::new(LinkOptions { baud, reports });
         Self { link, output: Vec::new(), owners: BTreeMap::new(), events: VecDeque::new() }
@@ -88,12 +88,12 @@ impl Line {
         self.output.clear();
     }
 
-    /// All reads end without a reply. The bytes that wait for the port are kept: they are a stop, or a part of a frame.
+    /// Ends all reads without a reply. The bytes that wait for the port are kept: they are a stop, or a part of a frame.
     pub(crate) fn end_reads(&mut self) {
         self.link.reset();
     }
 
-    /// Gives up the reads of this owner: what they show is out of date.
+    /// Gives up the reads of this owner, because their values are out of date.
     pub(crate) fn cancel_reads(&mut self, owner: Owner) {
         let link = &mut self.link;
         self.owners.retain(|&id, owners| {
@@ -106,7 +106,7 @@ impl Line {
         self.events.retain(|(other, _)| *other != owner);
     }
 
-    /// Has a read no reply yet?
+    /// Does a read still wait for its reply?
     pub(crate) fn is_waiting(&self) -> bool {
         !self.owners.is_empty()
     }
@@ -225,7 +225,8 @@ impl Line {
         self.output.drain(..count.min(self.output.len()));
     }
 
-    /// The next timeout: of a reply, or of an empty line for the deframer. Now, while the end of a read waits.
+    /// The next timeout: of a reply, or of an idle line for the deframer. [`Instant::ZERO`] while events wait for
+    /// [`Self::next_event`].
     pub(crate) fn deadline(&self) -> Instant {
         if self.events.is_empty() { self.link.deadline() } else { Instant::ZERO }
     }

@@ -10,8 +10,8 @@
 //! * A client has at most one read without a reply; its later requests wait behind it, so their order is kept.
 //! * The report registers belong to each client (`own_registers`). The arm sends no reports: the sampler reads the
 //!   arm once, at the highest frequency that any client wants, and all clients share the values.
-//! * Without an arm requests are dropped. A request that waited could move an arm that a person just plugged in. With one,
-//!   what moves or switches something is dropped after 200 ms in the queue.
+//! * Without an arm requests are dropped. A request that waited could move an arm that a person just plugged in. With an arm, a
+//!   request that moves or switches something is dropped after 200 ms in the queue.
 //! * A stop goes before everything else, and ends what the other clients stream (`drive`, `intent`).
 
 mod admission;
@@ -76,8 +76,8 @@ enum ArmState {
     Identifying(Instant),
     /// A 7Bot V2 answered.
     Present,
-    /// The port is open, and the arm answers no more. The next question is due at this time. It is still held: perhaps only
-    /// its replies are lost.
+    /// The port is open, but the arm no longer answers. The next question is due at this time. Holds are still sent, because
+    /// perhaps only the replies are lost.
     Silent(Instant),
 }
 
@@ -88,17 +88,17 @@ pub struct Hub {
     next_id: ClientId,
     arm: ArmState,
     known: KnownRegisters,
-    /// The chip id that the arm has to have.
+    /// The chip id that the arm has to have; `None`: any.
     chip_id: Option<Vec<u8>>,
     line: Line,
     presence: Presence,
     sampler: Sampler,
     watchdog: ClientWatchdog,
-    /// The hub holds the arm by itself.
+    /// The hold in progress.
     hold: Option<ArmHold>,
-    /// What came of the last hold.
+    /// The outcome of the last hold; `None`: it has not ended, or there was none.
     hold_outcome: Option<HoldOutcome>,
-    /// That of a hold that failed, until it was told.
+    /// The outcome of a failed hold, until [`Hub::take_failed_hold`] takes it.
     failed_hold: Option<HoldOutcome>,
     /// A hold slowed the joints down, and has not restored their speeds.
     is_slowed: bool,
@@ -179,7 +179,7 @@ impl Hub {
         std::mem::take(&mut self.news)
     }
 
-    /// Do writes not reach the arm?
+    /// Is the hub read-only, so that no write reaches the arm?
     #[must_use]
     pub const fn is_read_only(&self) -> bool {
         self.options.is_read_only
@@ -210,7 +210,7 @@ impl Hub {
         self.deliver_all(Instant::ZERO);
     }
 
-    /// Nothing of what was sent or waits may reach the arm that comes next.
+    /// Drops everything that was sent or waits, so that none of it reaches the next arm.
     fn forget_arm(&mut self) {
         self.line.reset();
         (self.hold, self.hold_outcome) = (None, None);
@@ -279,7 +279,7 @@ impl Hub {
         }
     }
 
-    /// Delivers the ends of all reads that have ended.
+    /// Delivers the events of all reads that have ended.
     fn deliver_all(&mut self, now: Instant) {
         while let Some((owner, event)) = self.line.next_event(now) {
             self.deliver(now, owner, event);

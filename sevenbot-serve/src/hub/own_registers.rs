@@ -1,7 +1,7 @@
-//! The registers that each client has for itself: the frequencies of its reports, and what they hold.
+//! The registers that each client has for itself: the frequencies and the content of its reports.
 //!
-//! A write gives them to the server, and the arm gets 0 in their place. A read of them is overlaid with the client's
-//! values. The other registers of the frame pass unchanged.
+//! The server takes their values from a write, and sends 0 to the arm in their place. In the reply to a read it inserts the
+//! client's values. The other registers of the frame pass unchanged.
 
 use protocol_core::registers::map::{FEEDBACK_FREQUENCY, OFFSET, REPORT_CONTENT};
 use protocol_core::registers::map21::{ANGLE_FEEDBACK_FREQUENCY, LOAD_FEEDBACK_FREQUENCY};
@@ -12,13 +12,13 @@ use protocol_core::report_kind::ReportKind;
 /// The values of a client's own registers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct OwnRegisters {
-    /// Of the reports of map 2.2, in Hz.
+    /// Frequency of the reports of map 2.2, in Hz.
     positions: u8,
     /// What these reports hold ([D26](protocol_core::decisions#d26)).
     content: u8,
-    /// Of the reports of present angles of map 2.1, in Hz.
+    /// Frequency of the reports of present angles of map 2.1, in Hz.
     angles: u8,
-    /// Of the reports of present loads of map 2.1, in Hz.
+    /// Frequency of the reports of present loads of map 2.1, in Hz.
     loads: u8,
     /// The map of the client's last write. The arm's form of the offsets depends on it ([M5](protocol_core::decisions#m5)).
     last_map: Option<Map>,
@@ -52,8 +52,8 @@ impl OwnRegisters {
         *self != before
     }
 
-    /// The map whose form a read of these registers has: that of the client's last write, or `before_writes`. `None` if
-    /// there are no offsets among them.
+    /// The map whose form of the offsets this read has to get: the map of the client's last write, or `before_writes`. `None`
+    /// if the read has no offsets.
     pub(crate) fn form_of_read(&self, address: u8, count: u8, before_writes: Map) -> Option<Map> {
         covers(&OFFSET, address, count.into()).then_some(self.last_map.unwrap_or(before_writes))
     }
@@ -95,7 +95,7 @@ impl OwnRegisters {
     }
 }
 
-/// Are there registers of the row among the `count` ones from `address` on?
+/// Do the `count` registers from `address` on include one of this row?
 pub(super) fn covers(row: &Register, address: u8, count: usize) -> bool {
     let (first, start) = (usize::from(row.address), usize::from(address));
     start < first + usize::from(row.count) && first < start + count

@@ -5,17 +5,17 @@
 //!                          3 questions unanswered, each for a second ──▶ silent
 //! ```
 //!
-//! Without a read that waits, and without a class, nothing is asked: the line of an idle server is quiet.
+//! While no read waits and no class watches, the hub asks nothing: the line of an idle server is quiet.
 
 use protocol_core::registers::map::DEVICE_CODE;
 use protocol_core::time::{Duration, Instant};
 
 /// Time between two questions.
 const PERIOD: Duration = Duration::from_millis(1_000);
-/// After so many questions without an answer, each for a second, the arm is silent. One lost reply says nothing.
+/// After this many unanswered questions, each with a timeout of 1 s, the arm counts as silent. One may be a lost reply.
 const MISSES: u8 = 3;
 
-/// When the arm answered last, and what was asked since.
+/// When the arm answered last, when it was asked last, and how many questions it missed.
 #[derive(Debug, Default)]
 pub(crate) struct Presence {
     heard: Instant,
@@ -47,7 +47,7 @@ impl Presence {
         self.asked = now;
     }
 
-    /// A question was not answered. Is the arm silent?
+    /// Notes an unanswered question. Returns whether the arm counts as silent.
     pub(crate) const fn miss(&mut self) -> bool {
         self.misses = self.misses.saturating_add(1);
         self.misses >= MISSES

@@ -1,6 +1,6 @@
-//! The positions that a client has read lately. Targets that equal them hold the arm: that is how every program stops it
-//! ([D24](protocol_core::decisions#d24) and `sevenbot::hold`), for the wire has no request to stop. A joint that was read to be near its
-//! target may keep it.
+//! The positions that a client has read lately. A write of targets that equal them holds the arm. Every program stops the arm
+//! in this way ([D24](protocol_core::decisions#d24) and `sevenbot::hold`), because the protocol has no request to stop. A joint
+//! that was read near its target may keep that target.
 
 use std::collections::VecDeque;
 
@@ -12,9 +12,9 @@ use protocol_core::time::{Duration, Instant};
 
 use super::angles::{UNMEASURED, angles_in, limits_in};
 
-/// A client may ask again before it writes what it read, so some readings are kept.
+/// Number of readings that are kept. A client may read again before it writes what it read first.
 const KEPT: usize = 8;
-/// Older readings tell nothing about where the arm is.
+/// Readings older than this no longer tell where the arm is.
 const FRESH: Duration = Duration::from_millis(1_000);
 
 /// A reply or a report that holds positions.
@@ -42,7 +42,8 @@ impl Readings {
         self.0.push_back(Reading { at: now, address, values: values.to_vec() });
     }
 
-    /// The number of joints that a write holds; `None` if it sends one elsewhere than the client has read.
+    /// The number of joints that a write holds; `None` if it has no targets, or sends a joint to another position than the
+    /// client has read.
     pub(crate) fn held_joints(&self, now: Instant, address: u8, values: &[u8]) -> Option<usize> {
         let fresh = self.0.iter().rev().take_while(|reading| now - reading.at < FRESH);
         let held = |reading: &Reading| {
@@ -54,8 +55,8 @@ impl Readings {
 }
 
 impl Reading {
-    /// The number of joints whose target in the write is the position of this reading; `None` if one is not. A joint may also keep
-    /// the target of this reading, and targets stay within the limits of the arm, as far as the reading has them.
+    /// The number of joints whose target in the write is the position of this reading; `None` if one is not. A joint may also
+    /// keep the target of this reading. If the reading has the limits (register 188), the held positions are kept within them.
     fn held(&self, targets: &Register, positions: &Register, address: u8, values: &[u8]) -> Option<usize> {
         let written = angles_in(targets, address, values);
         let [present, measured] = [targets, positions].map(|row| angles_in(row, self.address, &self.values));

@@ -61,8 +61,8 @@ impl WholeRequest {
     }
 }
 
-/// A write without the registers at its ends that no write has an effect on ([D15](protocol_core::decisions#d15)): the
-/// longest frame that is left takes 17 ms at 115 200 baud and not 23, and a stop cannot interrupt it.
+/// Removes from both ends of a write the registers on which no write has an effect ([D15](protocol_core::decisions#d15)). The
+/// longest frame then takes 17 ms at 115 200 baud instead of 23. A stop has to wait for a frame that is being sent.
 pub(crate) fn without_idle_ends(address: u8, values: &[u8]) -> (u8, &[u8]) {
     let is_idle = |place: usize| {
         let register = usize::from(address) + place;

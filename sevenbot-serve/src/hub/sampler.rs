@@ -16,7 +16,7 @@ use protocol_core::report_kind::ReportKind;
 pub(crate) struct Sampler {
     timers: [Timer; ReportKind::ALL.len()],
     pub(crate) share: Share,
-    /// A sample is due, and its share has joined those of the clients.
+    /// A sample is due, and the share of the sampler has joined the shares of the clients.
     waits: bool,
     /// In bits per second.
     baud: u32,
@@ -56,7 +56,7 @@ impl Sampler {
         streams.find(|(timer, _)| timer.due <= now).map(|(_, stream)| stream)
     }
 
-    /// Does a sample begin to wait?
+    /// Has a sample become due since the last one was sent? True once for each.
     pub(crate) fn begins_to_wait(&mut self, now: Instant) -> bool {
         let begins = !self.waits && self.due() <= now;
         self.waits |= begins;
@@ -72,8 +72,9 @@ impl Sampler {
     }
 }
 
-/// At most half of the line is for reports, of all streams together ([D14](protocol_core::decisions#d14),
-/// [M2](protocol_core::decisions#m2)). `bytes`: of one report of each.
+/// The highest frequency, in Hz, at which the reports of all streams together take at most half of the line
+/// ([D14](protocol_core::decisions#d14), [M2](protocol_core::decisions#m2)); at least 1. `bytes`: the length of one report of
+/// each stream.
 fn highest_frequency(baud: u32, bytes: usize) -> u32 {
     let bytes = u32::try_from(bytes).unwrap_or(u32::MAX);
     (baud / 20).checked_div(bytes).unwrap_or(0).max(1)

@@ -30,7 +30,7 @@ impl Timer {
         }
     }
 
-    /// A due time that is a whole period late is skipped, and does not make a burst.
+    /// Advances to the next due time. If that is more than a period late, goes on from `now` instead of sending a burst.
     pub(crate) fn advance(&mut self, now: Instant) {
         let due = self.due + self.period;
         self.due = if due + self.period < now { now + self.period } else { due };
@@ -55,7 +55,8 @@ impl Schedule {
         }
     }
 
-    /// Is a report of the stream due? A report may be half a sample early, so that the mean frequency is kept.
+    /// Is a report of the stream due? If so, advances to the next one. A report may come early by [`EARLY`], so that the mean
+    /// frequency is kept.
     pub(crate) fn take_due(&mut self, now: Instant, stream: ReportKind) -> bool {
         let Some(timer) = self.0.get_mut(stream.index()) else { return false };
         let is_due = timer.period != Duration::ZERO && timer.due <= now + EARLY;

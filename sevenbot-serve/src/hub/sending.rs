@@ -1,4 +1,4 @@
-//! From the queues to the line: stops first, then what the hub does by itself, then the client whose turn it is.
+//! From the queues to the line: stops first, then the frames of the hub itself, then the client whose turn it is.
 
 use protocol_core::registers::Map;
 use protocol_core::registers::map::{OFFSET, SPEED};
@@ -16,7 +16,7 @@ use super::watchdog::ClientWatchdog;
 use protocol_core::report_kind::ReportKind;
 
 impl Hub {
-    /// Sends stops, and what the hub needs to hold the arm. They wait for no other frame.
+    /// Sends urgent requests, and what the hub needs to hold the arm. They wait for no other frame.
     pub(super) fn send_urgent(&mut self, now: Instant) {
         let ids: Vec<ClientId> = self.clients.keys().copied().collect();
         for id in ids {
@@ -53,13 +53,13 @@ impl Hub {
         true
     }
 
-    /// Where a client that was idle starts beside those that wait.
+    /// The tag at which a client that was idle joins those that wait: [`Shares::floor`].
     pub(super) fn floor(&self) -> u64 {
         let waiting = self.clients.values().filter(|client| !client.waiting.is_empty());
         self.shares.floor(waiting.map(|client| client.share))
     }
 
-    /// Drops what waited too long.
+    /// Drops the requests that waited too long.
     fn drop_stale(&mut self, now: Instant) {
         for (&id, client) in &mut self.clients {
             if client.drop_stale(now) {
@@ -90,8 +90,8 @@ impl Hub {
         }
     }
 
-    /// Takes the reads of the same registers that are next of other clients: one reply answers all. Many programs read where the
-    /// arm is. A read of the offsets is a client's own, because of their form.
+    /// Takes the reads of the same registers that are next in the queues of other clients: one reply answers all of them. Many
+    /// programs poll the positions. A read of the offsets is not shared, because their form depends on the client.
     fn take_equal_reads(&mut self, now: Instant, id: ClientId, address: u8, count: u8) -> Vec<ClientId> {
         let mut others = Vec::new();
         if covers(&OFFSET, address, count.into()) {
@@ -153,7 +153,7 @@ impl Hub {
         }
     }
 
-    /// A write goes to the arm: which joints does it hold, or move?
+    /// Notes which joints a write to the arm holds or moves.
     pub(super) fn note_targets(&mut self, intent: Intent, map: Map, address: u8, values: &[u8]) {
         let targets = self.known.targets_in(map, address, values);
         self.held.note_write(intent, &targets);

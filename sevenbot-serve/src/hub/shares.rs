@@ -2,7 +2,7 @@
 //!
 //! Each client has a tag: the bytes up to which it has used the line. The request that would end at the lowest tag is next, so
 //! a short one does not wait for long ones that could begin at the same tag. A client that was idle starts at the lowest tag of
-//! those that wait. So it waits for one frame, and however many frames others have queued does not matter.
+//! those that wait. So it waits for one frame, however many frames the others have queued.
 
 /// The tag of a client, and when it was served last.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -31,14 +31,14 @@ pub(crate) struct Shares {
 }
 
 impl Shares {
-    /// Where a client starts that was idle, beside those that wait. Not at the tag of the last request: many short ones of one
-    /// client run ahead of the others by the length of a long one.
+    /// The tag at which a client that was idle starts: the lowest tag of those that wait. The tag of the last request may be
+    /// too high: many short requests of one client run ahead of the others by the length of a long one.
     pub(crate) fn floor(&self, waiting: impl Iterator<Item = Share>) -> u64 {
         waiting.map(|share| share.tag).min().unwrap_or(self.current)
     }
 
-    /// The request with the smallest order is next; it has this many bytes. Between equal ends it is that of the client that
-    /// has waited longest.
+    /// The sort key of a request of `bytes` bytes: the request with the smallest key is next. Of requests that would end at the
+    /// same tag, the client that has waited longest is next.
     pub(crate) fn order(share: Share, bytes: usize) -> (u64, u64) {
         (share.tag.saturating_add(length(bytes)), share.turn)
     }

@@ -7,10 +7,11 @@
 //!                                      └────── the client sends again ─────┘
 //! ```
 //!
-//! The arm counts the frames of all clients, and the samples. So once the client has been silent for the time of its
+//! The arm's watchdog sees the frames of all clients, and the samples. So once the client has been silent for the time of its
 //! watchdog, the hub does what the arm would do. A client that has left is silent, too. The arm's own watchdog acts if the
-//! server fails. It is set to [`LEAST_OF_ARM`] at least: in a short pause of a busy server it would hold joints that brake
-//! after a stop where their set-points are, and not where the stop was confirmed. A client reads what it wrote.
+//! server fails. It is set to [`LEAST_OF_ARM`] at least. A shorter one could act in a short pause of a busy server: it would
+//! hold joints that still brake after a stop at their set-points, not where the stop was confirmed. Clients read the value that
+//! a client wrote.
 
 use protocol_core::registers::map::{HOST_WATCHDOG, WATCHDOG_ACTION};
 use protocol_core::time::{Duration, Instant};
@@ -21,10 +22,10 @@ use super::own_registers::byte_at;
 /// One step of register 186.
 const STEP: Duration = Duration::from_millis(10);
 
-/// The least time of the arm's own watchdog, in steps of 10 ms: joints that brake stand by then.
+/// The least time of the arm's own watchdog, in steps of 10 ms. Joints that brake have come to rest by then.
 const LEAST_OF_ARM: u8 = 20;
 
-/// What a watchdog does (register 187).
+/// The action of a watchdog (register 187).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum WatchdogAction {
     /// Every joint holds.
@@ -84,7 +85,7 @@ impl ClientWatchdog {
         }
     }
 
-    /// What to do now, once in each silence.
+    /// The action that is due now: once in each silence of the client.
     pub(crate) fn poll(&mut self, now: Instant) -> Option<WatchdogAction> {
         let due = self.due();
         let watched = self.watched.as_mut().filter(|_| due <= now)?;

@@ -58,7 +58,7 @@ impl Block {
     }
 }
 
-/// Are there joint angles for the block in these registers? It decides as the arm does.
+/// Are there joint angles for the block in these registers? Makes the same check as the arm.
 pub(super) fn has_solution(address: u8, values: &[u8]) -> bool {
     let registers = RegisterFile::new([0; 6], None);
     registers.check_map21(address, values).is_ok_and(|accepted| reach::is_within(&accepted))
@@ -73,7 +73,8 @@ fn three(message: &Value, name: &str) -> Result<[f64; 3], String> {
     numbers.ok_or_else(|| format!("{name} array must have 3 numbers"))
 }
 
-/// Whole millimetres plus 1024, high byte first. A position beyond the registers is out of reach at their limit, too.
+/// Whole millimetres plus 1024, high byte first. A position beyond the range of the registers is clamped. It is out of reach at
+/// the limit, too.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the type")]
 fn position(millimetres: [f64; 3]) -> [u8; 6] {
     let [x, y, z] = millimetres.map(|value| {

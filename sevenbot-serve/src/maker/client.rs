@@ -1,8 +1,8 @@
 //! A client of the maker's WebSocket: its commands one after the other, and the answers in their order.
 //!
-//! A stop is carried out when it comes, and drops the commands before it that move the arm. Only its answer keeps its place.
-//! So that a stop never waits behind other messages, a message is always taken. A command for which the queue has no room is
-//! refused, and its answer keeps its place, too.
+//! A stop is carried out when it comes, and drops the earlier commands that move the arm. Only its answer waits for its turn.
+//! Every message is taken, so that a stop never waits behind others. A command for which the queue has no room is refused, and
+//! the refusal is answered in its turn, too.
 //!
 //! A read is always answered. All other commands are answered only to a browser: the maker's Python client does not wait
 //! for their answers, and takes the next message for the answer to its next read.
@@ -23,20 +23,21 @@ const MOST_ANSWERS: usize = 8;
 /// Commands that may wait. A pose takes 1.2 ms at 115 200 baud, and a target is dropped after 200 ms: a longer queue of targets would
 /// hold some that are dropped anyway.
 const MOST_COMMANDS: usize = 200;
-/// Stops between refused commands lengthen the queue further. A client with so many is disconnected.
+/// A client with this many entries in its queue is disconnected. Stops between refused commands lengthen the queue beyond
+/// [`MOST_COMMANDS`].
 const MOST_WAITING: usize = 400;
 
-/// What waits for its turn.
+/// An entry of the queue of messages.
 #[derive(Debug)]
 enum Waiting {
-    /// It was sent at this time at the earliest.
+    /// A command, and the earliest time at which it can have been sent.
     Command(Instant, MakerCommand),
     Wrong(MakerCommandError),
     /// A stop that was carried out, and waits for its answer.
     Stopped(Admission),
-    /// A stop came after this command.
+    /// A command that a later stop dropped, and that waits for its answer.
     Dropped,
-    /// So many commands in a row found no room, and wait for their answers.
+    /// This many commands in a row were refused for lack of room, and wait for their answers.
     Refused(usize),
 }
 
@@ -86,13 +87,13 @@ impl MakerClient {
         });
     }
 
-    /// Does the client go on with stops although hundreds of its messages wait for their answers?
+    /// Do so many messages wait for their answers that the client has to be disconnected?
     #[must_use]
     pub fn is_overrun(&self) -> bool {
         self.waiting.len() >= MOST_WAITING
     }
 
-    /// A command finds no room.
+    /// Refuses a command for lack of room. Queues its answer, if the client expects one.
     fn refuse(&mut self, is_read: bool) {
         if !is_read && !self.is_browser {
             return;
@@ -130,7 +131,7 @@ impl MakerClient {
         }
     }
 
-    /// Carries out the stops that wait, and drops what moves the arm before them.
+    /// Carries out the stops that wait, and drops the earlier commands that move the arm.
     fn stop_at_once(&mut self, hub: &mut Hub, now: Instant) {
         let is_stop = |waiting: &Waiting| matches!(waiting, Waiting::Command(_, MakerCommand::Stop));
         let Some(last) = self.waiting.iter().rposition(is_stop) else { return };
@@ -164,7 +165,7 @@ impl MakerClient {
                 self.answer(false, &done_or_refused(done, admission));
             }
             (MakerCommand::InverseKinematics { .. }, refused)
-                // These still end, with two events.
+                // In these two cases the command ends later, with two events.
                 if !matches!(refused, Admission::Queued | Admission::NoArm) =>
             {
                 self.answer(false, &done_or_refused("", refused));
@@ -181,7 +182,7 @@ impl MakerClient {
         self.answers.push_back(no_room().to_string());
     }
 
-    /// Ends a stop once the arm holds, or may not.
+    /// Answers a stop once the outcome of the hold is known.
     fn finish_stop(&mut self, hub: &Hub) {
         let answer = match hub.hold_outcome() {
             Some(HoldOutcome::Holds | HoldOutcome::Limp) => message("Stopped"),
@@ -211,7 +212,7 @@ impl MakerClient {
             (Some(command), Event::NoReply { .. }) => {
                 self.answer(is_read(&Ok(command)), &error("The arm does not answer"));
             }
-            // Nothing is pushed: the programs of the maker take any message for an answer.
+            // Reports are not sent: the maker's programs take any message for an answer.
             (current, _) => self.current = current,
         }
     }
@@ -224,7 +225,7 @@ impl MakerClient {
     }
 }
 
-/// What the command asks of the arm.
+/// The request of a command to the arm; `None` for a ping or a stop.
 fn request(command: &MakerCommand) -> Option<WholeRequest> {
     Some(match command {
         MakerCommand::Ping | MakerCommand::Stop => return None,
@@ -281,7 +282,7 @@ fn no_room() -> Value {
     error("Too many commands wait")
 }
 
-/// Does the sender of this message wait for an answer, whoever it is?
+/// Is the message a read? Only a read is answered to every client.
 fn is_read(command: &Result<MakerCommand, MakerCommandError>) -> bool {
     match command {
         Ok(command) => matches!(command, MakerCommand::Read { .. }),

@@ -12,7 +12,7 @@ use crate::token::is_equal;
 /// The path of the maker's WebSocket.
 const PATH: &str = "/ws";
 
-/// What a request needs to be accepted.
+/// The conditions under which a request is accepted.
 #[derive(Clone, PartialEq, Eq)]
 pub struct AccessPolicy {
     /// The secret, if one is needed.

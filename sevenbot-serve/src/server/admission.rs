@@ -1,8 +1,9 @@
-//! Places for connections: for those that have not shown their token yet, and others for clients.
+//! Places limit the number of connections: some are for connections that have not shown their token yet, others for clients.
 //!
-//! If all places before the token are taken, the oldest connection there loses its place to the next one. So connections that
-//! send nothing do not keep out a client that sends its token at once. Wrong tokens make the next ones of the same address
-//! wait, one after the other. While there are more connections than places, no other one is accepted: each takes file descriptors.
+//! If all places for connections without a token are taken, the oldest of these connections loses its place to the next one. So
+//! connections that send nothing do not keep out a client that sends its token at once. After wrong tokens, the next ones of
+//! the same address are checked one after the other, each after a delay. While there are more connections than places, no other
+//! one is accepted, because each takes file descriptors.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::net::IpAddr;
@@ -145,7 +146,7 @@ impl Admission {
         Arc::clone(&self.reserved).try_acquire_owned().ok()
     }
 
-    /// Waits as long as the wrong tokens of this address make it wait. The caller then checks its token, and notes the outcome.
+    /// Waits for the delay that wrong tokens of this address cause. The caller then checks its token, and calls [`Self::note`].
     pub(super) async fn wait(&self, address: Option<IpAddr>) -> Result<(), TooManyWait> {
         let Some(address) = address else { return Ok(()) };
         let turn = {
@@ -164,8 +165,8 @@ impl Admission {
         Ok(())
     }
 
-    /// The next check of a token of this address is that of the caller, unless another one has just taken it. Returns until when to
-    /// wait then.
+    /// Takes the next check of a token of this address for the caller, and returns `None`. If the delay is not over yet, or
+    /// another connection took the check, returns when to try again.
     fn take_turn(&self, address: IpAddr) -> Option<Instant> {
         let mut wrong = lock(&self.wrong);
         let wrong = wrong.get_mut(&address)?;

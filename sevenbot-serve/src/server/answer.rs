@@ -37,7 +37,8 @@ pub(super) enum Protocol {
 }
 
 impl Protocol {
-    /// The teacher, and the pupil with the arm, are let in however many tabs there are.
+    /// Does the connection have a reserved place? The teacher, and the pupil with the arm, are let in however many tabs there
+    /// are.
     pub(super) const fn has_reserved_place(self) -> bool {
         matches!(self, Self::Class(Role::Teacher) | Self::LentArm(_))
     }
@@ -58,7 +59,7 @@ pub(super) fn accept<B>(request: &Request<B>, protocol: Protocol) -> Result<Answ
         .map_err(|_| (StatusCode::BAD_REQUEST, "This address takes WebSocket connections only.\n"))
 }
 
-/// The name by which the browser knows this server. It has to be an address of this computer.
+/// The name by which the browser knows this server. It has to be an IP address or `localhost`.
 pub(super) fn own_host<B>(request: &Request<B>) -> Result<&str, Refusal> {
     header(request, "host")
         .filter(|host| is_address(host))

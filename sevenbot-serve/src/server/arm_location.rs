@@ -40,7 +40,7 @@ impl PortSearch {
         self.others = Some(others);
     }
 
-    /// The port to try after `last`, in the order of their names; `None`: `last` again.
+    /// The port to try after `last`, in the order of the names; `None`: try `last` again.
     pub(crate) fn next(&mut self, last: &Path) -> Option<PathBuf> {
         let others = self.others.as_mut()?;
         let mut ports = (self.list)();

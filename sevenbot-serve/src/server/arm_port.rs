@@ -27,15 +27,15 @@ pub(super) struct ArmPort {
     search: Option<PortSearch>,
     baud: u32,
     state: ArmPortState,
-    /// What the last notice said, so that it is not repeated.
+    /// The last notice, so that it is not repeated.
     last_notice: Option<Notice>,
 }
 
 #[derive(Debug)]
 enum ArmPortState {
-    /// Tried again at this time.
+    /// When to try to open the port again.
     Closed(Instant),
-    /// Opened at this time, or the arm was there then.
+    /// The port, and when it was opened, or when the arm was last present.
     Open(ArmSerial, Instant),
 }
 
@@ -112,8 +112,8 @@ impl ArmPort {
         }
     }
 
-    /// Does the port of a silent arm stay open? A stop may still reach the arm, and an unplugged adapter is an error. Where the arm
-    /// may come back under another name, that is tried, too.
+    /// Does the port of a silent arm stay open? Then a stop may still reach the arm, and unplugging the adapter is an error.
+    /// But with a search the port is closed, to try other names.
     const fn stays_open(&self, hub: &Hub) -> bool {
         hub.is_silent() && self.search.is_none()
     }
@@ -134,7 +134,7 @@ impl ArmPort {
     fn deadline(&self, hub: &Hub) -> Instant {
         match &self.state {
             ArmPortState::Closed(due) => *due,
-            // Only while it is not known what is behind the port does the time matter, but then it is short.
+            // The timeout applies only while no arm answers, and not if the port of a silent arm stays open.
             ArmPortState::Open(.., since) if !hub.has_arm() && !self.stays_open(hub) => {
                 *since + self.identify_timeout()
             }
@@ -179,7 +179,7 @@ impl ArmPort {
     }
 }
 
-/// Passes all bytes that have arrived. The read without bytes at the end states that the line is silent.
+/// Passes all bytes that have arrived. If there are none, an empty slice states that the line is silent.
 fn read_all(port: &ArmSerial, hub: &mut Hub, now: Instant) -> io::Result<()> {
     let mut bytes = [0; 4_096];
     loop {

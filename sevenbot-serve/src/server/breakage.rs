@@ -1,4 +1,4 @@
-//! Tells when a connection breaks, also while nothing of it is read.
+//! Tells when a connection breaks, even while nothing is read from it.
 
 #[cfg(unix)]
 use std::io;
@@ -10,21 +10,21 @@ use tokio::io::Interest;
 #[cfg(unix)]
 use tokio::io::unix::AsyncFd;
 
-/// Tells when a connection breaks, also while nothing of it is read.
+/// Tells when a connection breaks, even while nothing is read from it.
 #[cfg(unix)]
 #[derive(Debug)]
 pub(super) struct Breakage(AsyncFd<OwnedFd>);
 
 #[cfg(unix)]
 impl Breakage {
-    /// Of another handle of a socket.
+    /// Watches a duplicate of the socket's descriptor.
     pub(super) fn of(socket: &impl AsFd) -> io::Result<Self> {
         let handle = socket.as_fd().try_clone_to_owned()?;
         #[expect(deprecated, reason = "an OwnedFd stays open, and stays the same")]
         AsyncFd::with_interest(handle, Interest::ERROR).map(Self)
     }
 
-    /// Does `work` until it ends, or the connection breaks: then there is no outcome.
+    /// Runs `work` until it ends; `None` if the connection breaks first.
     pub(super) async fn or_end<T>(&self, work: impl Future<Output = T>) -> Option<T> {
         tokio::select! {
             outcome = work => Some(outcome),

@@ -13,8 +13,8 @@ use super::shared::Shared;
 
 /// Bytes that are read at once. Between two pieces of a flood the others have their turns.
 const PIECE: usize = 512;
-/// What a frame begins with. A web page can reach this port, but whatever it sends begins otherwise: the method of HTTP, or
-/// the handshake of TLS.
+/// The first byte of a frame. A web page can reach this port, but its data begins with a method of HTTP or the handshake of
+/// TLS.
 const FIRST_BYTE: u8 = 0xAA;
 
 /// A stream of bytes.
@@ -22,11 +22,11 @@ pub(super) trait ByteStream: AsyncRead + AsyncWrite + Unpin + Send {}
 
 impl<S: AsyncRead + AsyncWrite + Unpin + Send> ByteStream for S {}
 
-/// Why a client was disconnected.
+/// The client was disconnected, because its first byte is not that of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct NoFrames;
 
-/// What a client has sent before its session began.
+/// The bytes that a client has sent before its session began.
 #[derive(Debug)]
 pub(super) struct First {
     pub(super) bytes: Vec<u8>,
@@ -45,7 +45,7 @@ pub(super) async fn serve(
 ) -> Result<(), NoFrames> {
     let (mut reader, mut writer) = tokio::io::split(stream);
     let mut client = FrameStream { session: FrameSession::open(shared), has_begun: false };
-    // When it was last seen that no byte waits to be read: what is read now was sent later.
+    // The last time at which no byte waited to be read. Bytes that are read now were sent later.
     let mut last_empty = since;
     let mut pace = Pace::new(shared.baud);
     let mut piece = vec![0; PIECE];
@@ -59,7 +59,7 @@ pub(super) async fn serve(
                 Some(Ok(bytes)) => {
                     pace.note(shared.now(), bytes.len());
                     client.put(last_empty, bytes)?;
-                    // So that a flood leaves the thread to others.
+                    // Yield, so that a flood does not keep the thread from other connections.
                     tokio::task::yield_now().await;
                     continue;
                 }

@@ -26,7 +26,7 @@ const LOGIN_TIMEOUT: Duration = Duration::from_secs(5);
 /// The longest first line.
 const LONGEST_LINE: usize = 256;
 
-/// What all connections of a TCP port share.
+/// The state that all connections of a TCP port share.
 #[derive(Clone)]
 pub(super) struct ByteServer {
     pub(super) shared: Arc<Shared>,
@@ -91,7 +91,7 @@ impl ByteServer {
         })
     }
 
-    /// Reads the first line. Returns what follows it; `None` if it is not the token.
+    /// Reads the first line. Returns the bytes after it; `None` if it is not the token.
     async fn read_token(
         &self,
         stream: &mut Box<dyn ByteStream>,

@@ -1,4 +1,4 @@
-//! The class, shared by the tasks of its connections, and its end of the real arm.
+//! The class, shared by the tasks of its connections, and its access to the real arm.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
@@ -13,18 +13,18 @@ use tokio::sync::{Notify, watch};
 use super::shared::{Shared, lock};
 use crate::hub::{ClientId, HoldOutcome, WholeRequest};
 
-/// Time between two looks at the clock: a lease that is over ends so late at most.
+/// Time between two polls of the class: a lease ends at most this late.
 const TICK: Duration = Duration::from_millis(50);
 
 /// Who may exchange frames with the real arm: the newest session of the present lease.
 type Session = Option<(LeaseId, u64)>;
 
-/// A class, and who has to hear of its news.
+/// A class, and the tasks to wake when it has messages.
 pub(super) struct Class {
     shared: Arc<Shared>,
     room: Mutex<Classroom>,
     wakes: Mutex<BTreeMap<ConnectionId, Arc<Notify>>>,
-    /// The client of the hub that holds the arm.
+    /// The client of the hub by which the class stops the arm.
     client: ClientId,
     session: watch::Sender<Session>,
 }
@@ -39,7 +39,7 @@ impl Class {
         Arc::new(Self { shared, room, wakes, client, session: watch::Sender::new(None) })
     }
 
-    /// Lets time pass for ever.
+    /// Polls the class for ever, once a [`TICK`].
     pub(super) async fn run(self: Arc<Self>) {
         loop {
             self.with(Classroom::poll);
@@ -47,7 +47,7 @@ impl Class {
         }
     }
 
-    /// Does something in the class, then what follows from it: the arm is held, a session ends, tasks wake up.
+    /// Runs `work` on the class, and applies the consequences: ends a session, holds the arm, wakes tasks.
     pub(super) fn with<T>(&self, work: impl FnOnce(&mut Classroom, Instant) -> T) -> T {
         let mut room = lock(&self.room);
         let now = self.shared.now();
@@ -82,7 +82,7 @@ impl Class {
         room.arm_news(now, news);
     }
 
-    /// A new connection wakes up by this when there is a message for it.
+    /// Adds a connection. The result wakes its task when there is a message for it.
     pub(super) fn join(&self, id: ConnectionId) -> Arc<Notify> {
         let wake = Arc::new(Notify::new());
         lock(&self.wakes).insert(id, Arc::clone(&wake));
@@ -100,7 +100,7 @@ impl Class {
         room.holder_key().filter(|key| is_key(key)).and(room.lease())
     }
 
-    /// Serves the arm to a pupil as long as the lease lasts. A newer session of the same lease ends it, too.
+    /// Serves the arm to a pupil as long as the lease lasts. A newer session of the same lease ends this one, too.
     pub(super) async fn while_lent(&self, lease: LeaseId, serve: impl Future<Output = ()>) {
         let mut watched = self.session.subscribe();
         let number = self.session.borrow().map_or(0, |(_, number)| number) + 1;

@@ -31,7 +31,7 @@ impl ClassSession {
         Self { class: Arc::clone(class), id, wake: class.join(id), is_closing: false }
     }
 
-    /// The end of a connection that the class does not want.
+    /// The message that closes the connection, once, if the class ends it.
     fn farewell(&mut self) -> Option<Message> {
         let is_over = !self.is_closing && self.class.with(|room, _| room.is_over(self.id));
         self.is_closing |= is_over;

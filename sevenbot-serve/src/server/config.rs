@@ -1,4 +1,4 @@
-//! What a server is told at its start.
+//! The configuration of a server at its start.
 
 use std::net::SocketAddr;
 use std::path::PathBuf;
@@ -14,7 +14,7 @@ use crate::hub::HubOptions;
 pub struct ServerConfig {
     /// The serial port of the arm; `None`: there is no arm.
     pub arm: Option<ArmLocation>,
-    /// Its rate, in bits per second.
+    /// The baud rate of the arm's line, in bits per second.
     pub baud: u32,
     /// Links to pseudo-terminals; Linux only.
     pub ptys: Vec<PathBuf>,
@@ -37,7 +37,7 @@ pub struct ServerConfig {
 }
 
 impl ServerConfig {
-    /// Nothing is served of an arm on a line with this rate, in bits per second.
+    /// A server without any way to connect yet. `baud` is the rate of the arm's line, in bits per second.
     #[must_use]
     pub const fn new(arm: Option<ArmLocation>, baud: u32) -> Self {
         Self {

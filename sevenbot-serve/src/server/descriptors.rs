@@ -37,7 +37,7 @@ pub(super) fn connections() -> usize {
     (free() / OF_EACH_KIND).clamp(1, MOST)
 }
 
-/// As many of these places of a class as the descriptors are enough for, beside the programs at the Unix socket.
+/// The places of a class, reduced to what the free descriptors allow beside the programs at the Unix socket.
 pub(super) fn fitting(places: Places) -> Places {
     fitting_in(places, free().saturating_sub(connections()))
 }
@@ -57,7 +57,7 @@ fn free() -> usize {
     else {
         return usize::MAX;
     };
-    // Where the system does not list them, those of a server with many ways in.
+    // If the system does not list the open descriptors, assume those of a server with all its listeners.
     let open = std::fs::read_dir("/dev/fd").map_or(RESERVED, Iterator::count);
     limit.saturating_sub(open + RESERVED)
 }

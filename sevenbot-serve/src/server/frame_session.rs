@@ -74,7 +74,8 @@ impl FrameSession {
         self.seat.news_until(if is_through { self.client.deadline() } else { Instant::FAR_FUTURE }).await;
     }
 
-    /// Another client uses the same wire from now on. The bytes that the hub has not got yet stay.
+    /// Ends this client, and opens the session of the next one on the same terminal. Keeps the bytes that the hub has not taken
+    /// yet.
     #[cfg(target_os = "linux")] // Pseudo-terminals are for Linux.
     pub(super) fn succeed(self) -> Self {
         let mut next = Self::open(self.seat.shared());
@@ -83,7 +84,7 @@ impl FrameSession {
         next
     }
 
-    /// States whether the bytes that the hub has not got yet are those of a client that is gone. Then its writes are carried
+    /// States whether the bytes that the hub has not taken yet come from a client that is gone. Then its writes are carried
     /// out, and its reads are dropped.
     #[cfg(target_os = "linux")] // For pseudo-terminals.
     pub(super) const fn set_drops_reads(&mut self, are_of_the_one_before: bool) {

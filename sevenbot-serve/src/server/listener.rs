@@ -21,7 +21,7 @@ const KEEPALIVE_PROBES: u32 = 3;
 /// A peer that takes no byte for this long is gone. Other systems than Linux decide that by themselves.
 #[cfg(target_os = "linux")]
 const USER_TIMEOUT: Duration = Duration::from_secs(60);
-/// After an error, such as too many open files, the next connection is waited for.
+/// Pause after a failed accept, as with too many open files.
 pub(super) const AFTER_ERROR: Duration = Duration::from_millis(100);
 
 /// Opens a TCP port.
@@ -36,7 +36,7 @@ pub(super) fn open_tcp(address: SocketAddr) -> Result<TcpListener, StartError> {
     TcpListener::from_std(listener).map_err(failed)
 }
 
-/// The next client. It does not delay short frames, and is dropped when its computer is gone.
+/// Accepts the next client. Its socket sends short frames at once, and fails when the computer of the client is gone.
 pub(super) async fn accept_tcp(listener: &TcpListener) -> (TcpStream, SocketAddr) {
     loop {
         match listener.accept().await {

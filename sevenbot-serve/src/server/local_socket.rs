@@ -23,7 +23,7 @@ pub(super) struct LocalSocket {
 }
 
 impl LocalSocket {
-    /// Listens at a path. Replaces a socket that a program left which was killed.
+    /// Listens at a path. Replaces a socket that a killed program left.
     pub(super) fn open(path: &Path) -> Result<Self, StartError> {
         let failed = |cause| StartError::Socket { path: path.to_owned(), cause };
         match fs::symlink_metadata(path) {

@@ -89,8 +89,8 @@ const MOST_NOTICES: usize = 4;
 /// Time between two notices about refused clients, so that a flood of them fills no log.
 const NOTICE_PERIOD: Duration = Duration::from_millis(200);
 
-/// Turns of tasks after which it is looked which other connections have bytes. A flood keeps tasks ready all the time, and a stop
-/// must not wait for many of their turns.
+/// Number of turns of tasks after which the runtime checks which other connections have bytes. A flood keeps tasks ready all
+/// the time, and a stop must not wait for many of their turns.
 const POLL_INTERVAL: u32 = 4;
 
 /// A server that has opened everything but the arm's port.
@@ -107,7 +107,7 @@ pub struct Server {
     config: ServerConfig,
 }
 
-/// Hides what has no text.
+/// A wrapper with [`std::fmt::Debug`], which [`TlsAcceptor`] lacks.
 #[derive(Clone)]
 struct TlsSettings(TlsAcceptor);
 
@@ -177,7 +177,7 @@ impl Server {
     /// Serves until it is stopped.
     ///
     /// # Errors
-    /// The operating system fails: a pseudo-terminal.
+    /// The operating system fails at a pseudo-terminal.
     pub fn run(self, stop: &Stop, notify: &mut dyn FnMut(Notice)) -> io::Result<()> {
         let Self { runtime, ptys, socket, tcp, web_socket, page, class, tls, config } = self;
         runtime.block_on(async {

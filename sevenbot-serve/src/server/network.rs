@@ -21,7 +21,7 @@ use super::site::{ClassConfig, PageConfig, PageSite, Site};
 use super::unsupported::LocalSocket;
 use super::web_server::WebServer;
 
-/// Connections with which a browser loads the page. A class opens it all at once.
+/// Connections that a browser opens to load the page. All pupils may load it at the same time.
 const FILES_OF_EACH_TAB: usize = 4;
 /// Tabs that are being told why they are refused.
 const REFUSED_TABS: usize = 8;

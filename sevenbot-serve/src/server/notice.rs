@@ -1,4 +1,4 @@
-//! What happens while the server runs.
+//! Events of the server while it runs.
 
 use std::net::SocketAddr;
 use std::path::PathBuf;
@@ -7,7 +7,7 @@ use tokio::sync::mpsc::Sender;
 
 use crate::hub::HoldOutcome;
 
-/// What happens to the server while it runs.
+/// An event of the server while it runs.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Notice {
     /// A 7Bot V2 answers on the port.

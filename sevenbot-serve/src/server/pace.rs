@@ -1,5 +1,5 @@
-//! How fast the bytes of a client are taken. A flood of requests that the hub drops at once would keep the server busy, and with it a
-//! stop of another client. So no client is read much faster than the arm's line could carry.
+//! How fast the bytes of a client are taken. A flood of requests that the hub drops at once would keep the server busy, and
+//! delay a stop of another client. So no client is read much faster than the arm's line could carry.
 
 use host_link::time_on_line;
 use protocol_core::time::{Duration, Instant};
@@ -9,10 +9,10 @@ const TIMES_LINE: u32 = 4;
 /// A client may be ahead of that rate by this time.
 const AHEAD: Duration = Duration::from_millis(20);
 
-/// The bytes of one client, as if they passed a line.
+/// The bytes of one client, timed as if they passed a line of [`TIMES_LINE`] times the arm's baud rate.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Pace {
-    /// Of the arm's line, in bits per second.
+    /// The baud rate of the arm's line, in bits per second.
     baud: u32,
     passed: Instant,
 }
@@ -22,7 +22,7 @@ impl Pace {
         Self { baud, passed: Instant::ZERO }
     }
 
-    /// So many bytes were read at `now`.
+    /// Notes that `bytes` bytes were read at `now`.
     pub(super) fn note(&mut self, now: Instant, bytes: usize) {
         self.passed = self.passed.max(now) + time_on_line(self.baud.saturating_mul(TIMES_LINE), bytes);
     }

@@ -34,15 +34,15 @@ impl PtyPort {
         Ok(Self { pty, clients, _link: link })
     }
 
-    /// Serves programs. When the last program has closed the terminal, what it wrote is carried out, its streams of reports
-    /// end, and the next program finds an arm that has just been opened.
+    /// Serves programs. When the last program has closed the terminal, its writes are still carried out and its streams of
+    /// reports end. The next program becomes a new client.
     pub(super) async fn serve(mut self, shared: Arc<Shared>) -> io::Result<()> {
         let master = Readiness::of(&self.pty.master())?;
         let opened = self.clients.as_ref().map(Readiness::of).transpose()?;
         let mut session = FrameSession::open(&shared);
         let mut last_empty = shared.now();
         let mut pace = Pace::new(shared.baud);
-        // Programs that are gone left bytes to this session.
+        // The session holds bytes of programs that have closed the terminal.
         let mut has_leftovers = false;
         loop {
             session.exchange();
@@ -54,8 +54,8 @@ impl PtyPort {
             }
             has_leftovers = !is_open && (has_leftovers || count > 0);
             if was_closed || count > 0 {
-                // What was read before, when no close was seen, the one before sent. While no program has the terminal open, all is
-                // of those before.
+                // After a close without new bytes, the bytes in the session were read before the close: the previous program
+                // sent them. While no program has the terminal open, all bytes come from previous programs.
                 session.set_drops_reads(!is_open || (was_closed && count == 0));
             }
             session.exchange();

@@ -10,7 +10,7 @@ use tokio::io::unix::{AsyncFd, AsyncFdReadyGuard};
 pub(super) struct Readiness(AsyncFd<OwnedFd>);
 
 impl Readiness {
-    /// Of another handle of `file`, which does not block.
+    /// Watches a duplicate of the descriptor of `file`, which has to be non-blocking.
     pub(super) fn of(file: &impl AsFd) -> io::Result<Self> {
         let handle = file.as_fd().try_clone_to_owned()?;
         // The newer way to register is unsafe for types that may close their descriptor or change it; this one does not.
@@ -18,8 +18,8 @@ impl Readiness {
         AsyncFd::new(handle).map(Self)
     }
 
-    /// Ends when there is something to read, or an error. The readiness is cleared before the file is read: what comes meanwhile
-    /// sets it again.
+    /// Ends when there is something to read, or an error. The readiness is cleared before the file is read, so bytes that
+    /// arrive meanwhile set it again.
     pub(super) async fn readable(&self) -> io::Result<()> {
         self.0.readable().await.map(clear)
     }

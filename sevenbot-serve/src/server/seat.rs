@@ -11,13 +11,13 @@ use crate::hub::{ClientId, Hub};
 /// How a connection ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum End {
-    /// The client closed it: what it sent before is carried out.
+    /// The client closed it: the requests that it sent before are carried out.
     Clean,
-    /// It broke, or the client did what it must not do: nothing more is carried out.
+    /// It broke, or the client broke a rule of the server: nothing more is carried out.
     Broken,
 }
 
-/// The place of a connection. A dropped one is that of a broken connection.
+/// The place of a connection. If it is dropped without [`Seat::leave`], the connection counts as broken.
 #[derive(Debug)]
 pub(super) struct Seat {
     shared: Arc<Shared>,

@@ -10,7 +10,7 @@ use tokio::sync::Notify;
 
 use crate::hub::{ClientId, Hub};
 
-/// The hub, and who has to hear of its news.
+/// The hub, and the tasks to wake when it has news.
 #[derive(Debug)]
 pub(super) struct Shared {
     hub: Mutex<Hub>,
@@ -24,14 +24,14 @@ pub(super) struct Shared {
 
 /// Time between two beats.
 const BEAT: Duration = Duration::from_millis(50);
-/// A beat that comes so long after the last one shows that the system did not run the server.
+/// A beat that comes this long after the last one shows that the system did not run the server.
 const MISSED: Duration = Duration::from_millis(150);
 
 /// Tells whether the server ran all the time.
 #[derive(Debug, Default)]
 struct Pulse {
     last: Instant,
-    /// The server did not run from this time on, until less than a beat ago.
+    /// When the server last ran before a pause, if the latest beat ended one.
     gap: Option<Instant>,
 }
 
@@ -41,7 +41,7 @@ impl Pulse {
         self.last = now;
     }
 
-    /// When what comes now can have been sent at the earliest, although it was waited for.
+    /// The earliest time at which bytes can have been sent that arrive at `now` while the server waits for them.
     fn earliest(&self, now: Instant) -> Instant {
         self.gap.unwrap_or(if now - self.last >= MISSED { self.last } else { now })
     }
@@ -59,7 +59,7 @@ impl Shared {
         })
     }
 
-    /// Notes for ever that the server runs.
+    /// Beats for ever, so that pauses of the server are noticed.
     pub(super) async fn beat(self: Arc<Self>) {
         loop {
             lock(&self.pulse).beat(self.now());
@@ -67,7 +67,8 @@ impl Shared {
         }
     }
 
-    /// When bytes that were waited for and come now can have been sent at the earliest: now, or while the server was suspended.
+    /// The earliest time at which bytes can have been sent that arrive now while the server waits for them: now, or the start
+    /// of a pause in which the system did not run the server.
     pub(super) fn earliest(&self) -> Instant {
         let now = self.now();
         lock(&self.pulse).earliest(now)
@@ -90,7 +91,7 @@ impl Shared {
         done
     }
 
-    /// For a client: the same, and wakes the task of the arm's port.
+    /// For a client: as [`Self::with_hub`], and wakes the task of the arm's port.
     pub(super) fn with_client<T>(&self, work: impl FnOnce(&mut Hub, Instant) -> T) -> T {
         let done = self.with_hub(work);
         self.arm.notify_one();

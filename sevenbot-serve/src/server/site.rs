@@ -94,7 +94,7 @@ impl Site {
         answer.unwrap_or_else(|(status, text)| Answer::Whole(refusal(status, text)))
     }
 
-    /// Is the answer for everybody, whatever secret they know?
+    /// Is the answer public, so that it needs no secret?
     pub(super) fn is_public<B>(&self, request: &Request<B>) -> bool {
         match self {
             Self::Page(_) => request.uri().path() != FRAMES,

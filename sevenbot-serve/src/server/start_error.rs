@@ -51,7 +51,7 @@ pub enum StartError {
         /// The reason.
         cause: io::Error,
     },
-    /// The operating system refuses what every server needs.
+    /// The operating system refuses a resource that every server needs.
     #[error("the operating system refuses: {0}")]
     System(io::Error),
     /// The address cannot be used.

@@ -1,4 +1,4 @@
-//! What a system has no equivalent of: it cannot be opened, so these have no values.
+//! Stand-ins for what a system does not support. They cannot be opened, so these types have no values.
 
 use std::io;
 use std::path::Path;

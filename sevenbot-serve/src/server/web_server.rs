@@ -46,7 +46,7 @@ const LONGEST_REQUEST: usize = 16 * 1_024;
 /// Bytes of a file that wait in the kernel for a slow client. Linux reserves twice as many.
 const FILE_BUFFER: usize = 256 * 1_024;
 
-/// What all connections of a port share.
+/// The state that all connections of a port share.
 #[derive(Clone)]
 pub(super) struct WebServer {
     pub(super) shared: Arc<Shared>,
@@ -63,7 +63,7 @@ struct Upgrade {
     connection: OnUpgrade,
     protocol: Protocol,
     place: Place,
-    /// What waits behind the request was sent at this time or later.
+    /// Bytes that wait behind the request were sent at this time or later.
     since: Instant,
 }
 
@@ -83,7 +83,7 @@ impl WebServer {
 
     /// Answers one request, and then serves the WebSocket if it asked for one.
     async fn serve_client(&self, stream: TcpStream, peer: SocketAddr) {
-        // A smaller buffer is only slower.
+        // An error does no harm: a smaller buffer is only slower.
         let _ = SockRef::from(&stream).set_send_buffer_size(FILE_BUFFER);
         let Ok(socket) = SockRef::from(&stream).try_clone() else { return };
         let answered = self.admission.log_in(TIMEOUT, self.answer_request(stream, peer)).await;
@@ -138,7 +138,7 @@ impl WebServer {
         upgrade: &Mutex<Option<Upgrade>>,
     ) -> Response<Full<Bytes>> {
         let since = self.shared.earliest();
-        // The files are public: only what needs the token waits for it.
+        // Only a request that needs a token waits after wrong ones. The files are public.
         if !self.site.is_public(&request) && self.admission.wait(Some(peer.ip())).await == Err(TooManyWait) {
             self.refused(peer, RefusalReason::Full);
             let text = "Too many wrong tokens came from your address. Try again in a minute.\n";

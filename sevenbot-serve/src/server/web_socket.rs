@@ -1,4 +1,4 @@
-//! WebSockets: frames in binary messages for the page; the maker's commands and those of a class in text messages.
+//! WebSockets: frames in binary messages for the page; the maker's commands, or the messages of a class, in text messages.
 
 use std::pin::Pin;
 use std::sync::Arc;
@@ -24,7 +24,7 @@ use crate::maker::MakerClient;
 const LONGEST_FRAMES: usize = 4_096;
 /// The longest message of the maker's programs, as in the maker's firmware.
 const LONGEST_COMMAND: usize = 2_048;
-/// A client that is told to close its connection has so long. Then the server does.
+/// Time for a client to close its connection after it was told to. Then the server closes it.
 const CLOSE_TIMEOUT: Duration = Duration::from_millis(1_000);
 /// Bytes that a client may send without a whole message among them: fragments without end fill no memory, but cost time.
 const MOST_UNFINISHED: usize = 32 * 1_024;
@@ -84,7 +84,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Messages<S> {
         match self.stream.next().await {
             Some(Ok(Message::Close(_))) | None | Some(Err(Error::ConnectionClosed)) => Err(End::Clean),
             Some(Ok(message)) => Ok(message),
-            // Many programs close the connection without a word.
+            // Many programs close the connection without a close message.
             Some(Err(Error::Protocol(tungstenite::error::ProtocolError::ResetWithoutClosingHandshake))) => {
                 Err(End::Clean)
             }
@@ -146,9 +146,10 @@ where
     (Sender::Idle(sink), Messages { stream, unfinished })
 }
 
-/// What a client's messages are for.
+/// Processes the messages of one client.
 pub(super) trait Session {
-    /// Carries out what came, as far as possible. Returns the next message for the client, if it `can_send` one.
+    /// Processes the messages and the news of the hub, as far as possible. Returns the next message for the client, if it
+    /// `can_send` one.
     fn advance(&mut self, can_send: bool) -> Option<Message>;
 
     /// May another message be put?
@@ -246,7 +247,7 @@ impl Session for MakerSession {
 /// A client of a WebSocket that was just opened.
 pub(super) struct WebClient<S> {
     pub(super) stream: S,
-    /// What it has sent already, it sent at this time or later.
+    /// The bytes that have arrived already were sent at this time or later.
     pub(super) since: Instant,
 }
 
@@ -288,7 +289,7 @@ async fn serve<S, T: Session>(
 {
     let (mut sender, mut messages) = open(client.stream, longest).await;
     let mut session = session();
-    // When it was last seen that no message waits: what is read now was sent later.
+    // The last time at which no message waited to be read. Messages that are read now were sent later.
     let mut last_empty = client.since;
     let mut pace = Pace::new(shared.baud);
     let mut end_at = Instant::FAR_FUTURE;
@@ -309,7 +310,7 @@ async fn serve<S, T: Session>(
                 Some(Ok(message)) => {
                     pace.note(shared.now(), messages.take_count());
                     session.put(last_empty, message);
-                    // So that a flood leaves the thread to others.
+                    // Yield, so that a flood does not keep the thread from other connections.
                     tokio::task::yield_now().await;
                     continue;
                 }
@@ -335,7 +336,7 @@ async fn serve<S, T: Session>(
         }
     };
     session.close(end);
-    // A client that sent no whole messages could else begin again at once.
+    // Wait, so that a client that sent no whole message cannot connect again at once.
     pace.note(shared.now(), messages.take_count());
     shared.sleep_until(pace.free_at()).await;
 }

@@ -27,7 +27,7 @@ pub struct Program {
     pub received: Vec<(Instant, Received)>,
     /// Reports of map 2.1.
     pub reports: Vec<Received>,
-    /// It takes the bytes for it.
+    /// The program takes the bytes that the server has for it.
     pub reads: bool,
 }
 
@@ -52,7 +52,7 @@ pub struct World {
     pub loses_replies: bool,
     /// Bytes to the arm are lost on the line.
     pub loses_requests: bool,
-    /// This frame to the arm is damaged on the line so many times.
+    /// A frame to the arm, and how many times it is damaged on the line.
     pub damaged_frame: (Vec<u8>, usize),
     pub programs: Vec<Program>,
     pub pages: Vec<Page>,

@@ -59,7 +59,7 @@ pub(crate) struct CalibrateArgs {
     yes: bool,
 }
 
-/// The arm has this time to restart.
+/// Time limit for the restart of the arm.
 const RESTART_TIMEOUT: Duration = Duration::from_secs(20);
 const POLL_PERIOD: Duration = Duration::from_millis(500);
 
@@ -106,7 +106,6 @@ fn store(
     session.printer.print(&OffsetTable::new(before, wanted))
 }
 
-/// Asks for the offsets of all joints.
 fn ask_offsets(arm: &mut Arm, before: Offsets) -> Result<Offsets, CommandError> {
     let mut wanted = before;
     arm.wait_until_settled()?;
@@ -168,7 +167,7 @@ fn ask_offset(arm: &mut Arm, joint: Joint, offset: i16) -> Result<i16, CommandEr
     }
 }
 
-/// Moves one joint. A refusal is only a warning.
+/// Moves one joint. If the arm refuses the move, warns and continues.
 fn nudge(arm: &mut Arm, joint: Joint, degrees: i16) -> Result<(), CommandError> {
     let moved = hold_on_interrupt(arm, |arm, interrupt| {
         let wanted = step_target(&arm.driven_joints()?, joint, degrees)?;
@@ -190,7 +189,7 @@ fn restart(session: &Session, mut arm: Arm, wanted: Offsets) -> Result<(), Comma
     let accepted =
         |arm: &mut Arm| Ok::<_, CommandError>(arm.status()?.map(|status| status.frames_accepted()));
     let before = accepted(&mut arm)?;
-    // The port may disappear with the supply.
+    // Close the port: it may disappear when the supply is switched off.
     drop(arm);
     ask("The offsets are written. To verify them, switch the arm off and on, then press Enter. > ")?;
     let mut arm = reconnect(session)?;

@@ -108,7 +108,6 @@ struct OffsetRow {
 }
 
 impl OffsetTable {
-    /// Old and new offsets.
     pub(super) fn new(before: Offsets, now: Offsets) -> Self {
         let row = |joint: Joint| {
             let (was, is) = (before.of(joint), now.of(joint));

@@ -35,11 +35,11 @@ pub(crate) struct ArmThread {
     pub(crate) start: Instant,
     pub(crate) events: Sender<ArmEvent>,
     pub(crate) commands: Receiver<UiCommand>,
-    /// The arm at the end of the thread.
+    /// The arm that was watched when the channel closed; Ctrl-C makes it hold.
     pub(crate) arm: Option<Arm>,
-    /// Where steps of the tip have brought it.
+    /// The state after the last step of the tip; `None` before the first.
     pub(crate) jog: Option<Jog>,
-    /// Bounds the steps of the tip; `None`: nothing does.
+    /// Limits the steps of the tip; `None`: no limits.
     pub(crate) guard: Option<Guard>,
 }
 
@@ -59,8 +59,8 @@ impl From<Error> for WatchEnd {
 }
 
 impl ArmThread {
-    /// Runs until the command channel closes. After Ctrl-C makes the arm hold, and returns the result; `None` without
-    /// an arm.
+    /// Runs until the command channel closes. After Ctrl-C it makes the arm hold and returns the result. `None`: there was no
+    /// Ctrl-C, or there is no arm.
     pub(crate) fn run(mut self) -> Option<Result<JointSnapshot, CommandError>> {
         while self.look().is_ok() {}
         let arm = self.arm.take();
@@ -86,7 +86,8 @@ impl ArmThread {
         self.pause(RECONNECT_PERIOD)
     }
 
-    /// Opens the port of the command line or the last one, or else another one that leads to an arm.
+    /// Opens the port used last. If that fails, and the command line names no port, searches for another one that leads to an
+    /// arm.
     fn open(&mut self) -> Result<Arm, String> {
         // One attempt: the screen counts each missing answer, and the next sample asks again.
         let options = ArmOptions { attempts: 1, ..self.options };
@@ -231,7 +232,7 @@ fn jog_tip(
     arm.end_abandoned_stream()?;
     let joints = arm.wait_until_settled()?;
     for joint in Joint::ALL {
-        // Fails where it is not known where a joint is.
+        // Fails if the position of a joint is unknown.
         step_target(&joints, joint, 0)?;
     }
     let targets = joints.targets().map(Angle::from_register);

@@ -29,7 +29,7 @@ use super::plot_kind::{PastSample, PlotKind};
 use super::sample::ArmSample;
 use super::view::{LinkState, MonitorView, PLOT_SPAN};
 
-/// One colour per joint. Users can change these in their terminal.
+/// One colour per joint, from the palette of the terminal, which users can change.
 const COLOURS: [Color; 7] =
     [Color::Red, Color::Yellow, Color::Green, Color::Cyan, Color::Blue, Color::Magenta, Color::Gray];
 const FAINT: Style = Style::new().fg(Color::DarkGray);
@@ -41,7 +41,7 @@ const LONGEST_GAP: Duration = Duration::from_millis(1500);
 /// Width of the table without its bars, in columns.
 const TABLE_WIDTH: usize = 49;
 
-/// Problems at the foot of the screen.
+/// Number of problems that the foot of the screen shows in full.
 const PROBLEMS_SHOWN: usize = 2;
 /// Height of the table: a header and seven joints.
 const JOINT_ROWS: u16 = 8;
@@ -84,7 +84,7 @@ fn heights(screen: u16, problem_lines: u16) -> [Constraint; 7] {
     ]
 }
 
-/// The most important problems, and below each what to do.
+/// The most important problems, each with its remedy below it.
 fn problem_lines(view: &MonitorView) -> Vec<Line<'static>> {
     let problems = view.sample.as_ref().map(|sample| sample.health.problems()).unwrap_or_default();
     let shown = problems.iter().take(PROBLEMS_SHOWN);
@@ -161,7 +161,7 @@ fn row(view: &MonitorView, sample: &ArmSample, joint: Joint, bar: usize) -> Line
     Line::from(spans)
 }
 
-/// The most important problem of a joint, or what it does.
+/// The most important problem of a joint, or its activity.
 fn joint_word(sample: &ArmSample, joint: Joint) -> (&'static str, Style) {
     let health = sample.health.joints.iter().find(|health| health.joint == joint);
     let problem = health.and_then(|health| health.problems().next());

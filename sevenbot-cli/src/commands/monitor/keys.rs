@@ -44,7 +44,7 @@ pub(crate) enum KeyAction {
     Stop,
 }
 
-/// Handles a key.
+/// Applies a key to the view. Ctrl-C works in every dialog.
 pub(crate) fn press(view: &mut MonitorView, key: KeyEvent) -> KeyAction {
     let is_ctrl_c = key.code == KeyCode::Char('c') && key.modifiers.contains(KeyModifiers::CONTROL);
     if is_ctrl_c {

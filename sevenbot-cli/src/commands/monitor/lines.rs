@@ -88,7 +88,7 @@ fn csv(sample: &ArmSample) -> String {
     .join(",")
 }
 
-/// The joints of which this is so; `None` if the firmware does not tell.
+/// The bits of the joints for which `is_so` is true; `None` if the firmware does not report it.
 fn joint_bits(sample: &ArmSample, is_so: fn(&JointHealth) -> Option<bool>) -> Option<u8> {
     sample
         .health
@@ -122,13 +122,13 @@ pub(crate) struct SampleJson {
     hottest_celsius: Option<u8>,
     round_trip_ms: f64,
     alarms: Option<u8>,
-    /// What needs attention, and what to do.
+    /// The problems with their remedies.
     problems: Vec<ProblemText>,
     #[serde(skip_serializing_if = "Option::is_none")]
     fine: Option<FineJson>,
 }
 
-/// What only the extended block has.
+/// The values of the extended block.
 #[derive(Debug, Serialize)]
 struct FineJson {
     positions: [Option<f64>; 7],

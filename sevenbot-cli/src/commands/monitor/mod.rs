@@ -109,7 +109,7 @@ pub(super) fn each_sample(
     let (mut due, mut told) = (start, Vec::new());
     for _ in 0..count {
         sleep(due.saturating_duration_since(Instant::now()));
-        // A late sample is not made up for.
+        // After a late sample the next period begins now, instead of catching up.
         due = (due + period).max(Instant::now());
         let sample = ArmSample::take(arm, start)?;
         warn_of_problems(&sample.health, &mut told);
@@ -118,7 +118,7 @@ pub(super) fn each_sample(
     Ok(())
 }
 
-/// Warns of problems that were not told yet: lines have no room for them.
+/// Warns of the problems that the previous sample did not have: the columns have no field for them.
 fn warn_of_problems(health: &Health, told: &mut Vec<Problem>) {
     let problems = health.problems();
     problems.iter().filter(|problem| !told.contains(problem)).for_each(warn);

@@ -21,7 +21,7 @@ pub(crate) enum PlotKind {
 }
 
 impl PlotKind {
-    /// The next kind for a key.
+    /// The kind after the next press of `p`.
     pub(crate) const fn next(self) -> Self {
         match self {
             Self::Position => Self::Velocity,
@@ -64,7 +64,7 @@ impl From<&ArmSample> for PastSample {
 }
 
 impl PastSample {
-    /// What the plot shows of a joint; `None` if the arm does not measure it.
+    /// The value of a joint in the plot, in the unit of `kind`; `None` if the arm does not measure it.
     pub(crate) fn value(&self, kind: PlotKind, joint: Joint) -> Option<f64> {
         let index = usize::from(joint.index());
         let tenths = |values: [i16; 7]| values.get(index).map(|&value| f64::from(value) / 10.0);

@@ -15,7 +15,7 @@ pub(crate) struct ArmSample {
     pub(crate) joints: JointSnapshot,
     /// Positions in hundredths, velocities and loads; `None` from an arm without the extended block.
     pub(crate) fine: Option<FineState>,
-    /// What is wrong, joint by joint.
+    /// The problems, joint by joint.
     pub(crate) health: Health,
     /// From a request to its reply.
     pub(crate) round_trip: Duration,
@@ -40,7 +40,7 @@ impl ArmSample {
         })
     }
 
-    /// The position of the tip, as exact as the arm measures it; `None` if a joint before it does not answer.
+    /// The position of the tip, as exact as the arm measures it; `None` if one of joints 1 to 6 does not answer.
     pub(super) fn tip(&self) -> Option<Vector> {
         if Joint::ALL.into_iter().take(6).any(|joint| self.joints.is_missing(joint)) {
             return None;

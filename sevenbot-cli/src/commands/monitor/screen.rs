@@ -29,7 +29,7 @@ pub(crate) fn run(
     plot: PlotKind,
     guard: Option<Guard>,
 ) -> Result<(), CommandError> {
-    // Without a port there is an error. A port without an answer is tried again.
+    // Fails if there is no port at all. The thread retries a port that does not answer.
     let port = session.port_name()?;
     let start = Instant::now();
     let mut view = MonitorView::new(&port, plot);
@@ -51,7 +51,7 @@ pub(crate) fn run(
     };
     let watching = thread::spawn(|| watcher.run());
     let shown = on_terminal(|terminal| show(terminal, &mut view, start, &hear, &command));
-    // Closing the channel ends the thread after the pending commands.
+    // Closing the channel ends the thread. After Ctrl-C it drops the pending commands.
     drop(command);
     let held = watching.join().ok().flatten();
     shown?;
@@ -78,7 +78,7 @@ fn show(
     events: &Receiver<ArmEvent>,
     commands: &Sender<UiCommand>,
 ) -> io::Result<()> {
-    // In raw mode Ctrl-C arrives as a key. Other signals still arrive.
+    // In raw mode Ctrl-C arrives as a key. Other signals, such as SIGTERM, still arrive as signals.
     Interrupt::catch();
     let reads_stdin = io::stdin().is_terminal();
     while !Interrupt::is_requested() {
@@ -121,10 +121,10 @@ fn wait_for_input(timeout: Duration, _reads_stdin: bool) -> io::Result<bool> {
 /// Reacts to an event; `false` ends the monitor.
 fn react(view: &mut MonitorView, event: &Event, commands: &Sender<UiCommand>) -> bool {
     match event {
-        // Some terminals also report releases.
+        // Some terminals also report key releases.
         Event::Key(key) if key.kind != KeyEventKind::Release => match press(view, *key) {
             KeyAction::Redraw => true,
-            // The thread ends only after this channel, so sending succeeds.
+            // The thread ends only after this channel is closed, so sending succeeds.
             KeyAction::Send(command) => commands.send(command).is_ok(),
             KeyAction::Quit => false,
             KeyAction::Stop => {

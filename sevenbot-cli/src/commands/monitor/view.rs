@@ -48,7 +48,7 @@ pub(crate) enum UiCommand {
     Nudge { joint: Joint, degrees: i16 },
     /// Move the tip by x, y and z along these axes.
     Jog { axes: JogAxes, millimetres: [i16; 3] },
-    /// Change the speed of all joints, starting from that of this joint.
+    /// Change the speed of all joints, starting from the speed of this joint.
     SpeedChange { joint: Joint, change: SpeedChange },
     /// Change the motor state.
     State(u8),
@@ -66,7 +66,7 @@ pub(crate) enum SpeedChange {
 impl SpeedChange {
     /// Size of a change, in steps of the register.
     const CHANGE: u8 = 5;
-    /// The highest speed; 0 is the maximum (D10).
+    /// The highest value of the register. The value 0 is faster: the motor's maximum (D10).
     const HIGHEST: u8 = 100;
 
     /// The next speed of the register.

@@ -104,7 +104,7 @@ fn speed(text: &str) -> Result<f64, &'static str> {
 }
 
 impl MoveToArgs {
-    /// Opens the arm; for a move, unless nothing moves.
+    /// Opens the arm; with --dry-run, without the preparations of [`Session::connect_to_move`].
     pub(super) fn connect(&self, session: &Session) -> Result<Arm, CommandError> {
         if self.dry_run { session.connect() } else { session.connect_to_move() }
     }

@@ -43,7 +43,7 @@ impl TargetDegrees {
         }
     }
 
-    /// What the targets are rounded to, and the decimals of a miss.
+    /// The text for the rounding of the targets, and the number of decimals of a miss.
     const fn rounding(self) -> (&'static str, usize) {
         match self {
             Self::Whole(_) => ("whole degrees miss", 1),
@@ -75,7 +75,7 @@ impl TipArrival {
         }
     }
 
-    /// With targets in hundredths of a degree.
+    /// Replaces the targets by ones in hundredths of a degree.
     pub(super) fn in_hundredths(self, target: &FineTipTarget) -> Self {
         Self {
             targets_degrees: TargetDegrees::Hundredths(target.angles.map(FineAngle::degrees)),

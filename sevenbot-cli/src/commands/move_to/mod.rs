@@ -61,7 +61,7 @@ fn take(
     session.printer.print(&arrival.with_measured(measured))
 }
 
-/// Shows the move of an arm with this project's firmware, which takes hundredths of a degree.
+/// Shows the move without an arm, as this project's firmware would make it: with targets in hundredths of a degree.
 fn print_without_arm(
     session: &mut Session,
     args: &MoveToArgs,

@@ -6,7 +6,7 @@
 //!    └── reads ───────▶ TelemetryReader (targets, velocities, loads, health) ───┘ MCAP only
 //! ```
 //!
-//! After any end the files have whole moments, and an arm that is still connected holds its position.
+//! However the recording ends, the files hold whole moments only. A guided arm that is still connected holds its position.
 
 mod outputs;
 mod teach_pendant;
@@ -147,7 +147,7 @@ pub(crate) fn run(session: &mut Session, args: &RecordArgs) -> Result<(), Comman
     let baud = session.options.baud;
     let done = set_motors(&mut arm, args).and_then(|()| {
         arm.with_reports(args.hz, content, |arm| {
-            // A restart would drive the joints of an arm that is to be guided.
+            // After a restart the controller drives the joints, although the user is to guide them.
             if arm.joints()?.has_restarted_since(&before) {
                 return Err(CommandError::Problems(vec![Problem::of_arm(ProblemKind::Restarted)]));
             }
@@ -170,7 +170,7 @@ pub(crate) fn run(session: &mut Session, args: &RecordArgs) -> Result<(), Comman
     session.printer.print(&recorded)
 }
 
-/// Each format has its argument.
+/// Refuses a FILE whose name means standard output, MCAP or CSV: FILE is always text.
 fn check_names(args: &RecordArgs) -> Result<(), CommandError> {
     let Some(file) = &args.file else { return Ok(()) };
     let name = file.display();

@@ -13,12 +13,12 @@ use crate::command_error::CommandError;
 use crate::line_file::LineFile;
 use crate::printer::note;
 
-/// The files of a recording, which have the same moments.
+/// The files of a recording. All of them get the same moments.
 pub(crate) struct Outputs {
     lines: RecordingLines,
     text: Option<(PathBuf, LineFile)>,
     mcap: Option<McapFile>,
-    /// The time of the first moment, since 1970.
+    /// The wall-clock time to which the times of the moments are added, since 1970. Set when the first moment is added.
     start: Option<Duration>,
 }
 
@@ -43,7 +43,7 @@ impl Outputs {
         Ok(Self { lines, text, mcap: mcap.map(McapFile::create).transpose()?, start: None })
     }
 
-    /// Is there a file for more than poses?
+    /// Does a file take telemetry besides poses? Only MCAP does.
     pub(crate) const fn has_telemetry(&self) -> bool {
         self.mcap.is_some()
     }
@@ -79,12 +79,12 @@ impl Outputs {
         self.lines.duration()
     }
 
-    /// Ends the files.
+    /// Finishes the MCAP file. The text file needs no end.
     pub(crate) fn finish(&mut self) -> Result<(), CommandError> {
         self.mcap.as_mut().map_or(Ok(()), |file| file.write(McapWriter::finish))
     }
 
-    /// Tells what the files have after a failure.
+    /// After a failure, tells the user how much the files hold.
     pub(crate) fn note_what_is_there(&self) {
         if let Some((path, _)) = &self.text {
             let (moments, seconds) = (self.count(), self.duration().as_secs_f64());
@@ -114,7 +114,7 @@ impl McapFile {
             true => Box::new(io::stdout()),
             false => Box::new(File::create(path).map_err(|error| CommandError::file(path, error))?),
         };
-        // A pipe is read while it is written.
+        // A pipe is read while it is written, so it needs each message at once.
         let layout = if path.is_file() { McapLayout::Indexed } else { McapLayout::Live };
         let writer = McapWriter::new(out, layout).map_err(|error| failed(path, error))?;
         Ok(Self { path: path.to_owned(), writer })

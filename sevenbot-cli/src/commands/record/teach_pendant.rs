@@ -109,7 +109,7 @@ impl Drop for TeachPendant {
 }
 
 fn command(key: KeyEvent, selected: Joint) -> Option<KeyCommand> {
-    // Some terminals also report releases.
+    // Some terminals also report key releases.
     if key.kind == KeyEventKind::Release {
         return None;
     }

@@ -1,4 +1,4 @@
-//! What is read of an arm during a recording besides its poses, as often as the line allows.
+//! Reads targets, velocities, loads and health during a recording, as often as the line allows. The poses come from reports.
 
 use std::time::{Duration, Instant};
 
@@ -11,11 +11,11 @@ use sevenbot::{Angle, Arm, Error, FineAngle, Health, Snapshot, Span};
 const REGISTERS: Span = Span::between(&FINE_TARGET, &LOAD);
 /// Bits of a question and its answer on the line: 7 bytes each around the values, ten bits a byte.
 const BITS: u32 = 10 * (7 + 7 + REGISTERS.count() as u32);
-/// The answers take at most this part of the line: the rest is for reports.
+/// Reads take at most one part in this many of the line. The rest is for reports.
 const SHARE_OF_LINE: u32 = 2;
 /// The time between two reads of the health, which has more registers.
 const HEALTH_PERIOD: Duration = Duration::from_secs(1);
-/// A read of the health takes as long on the line as this many other answers.
+/// A read of the health takes as long on the line as this many reads of the telemetry.
 const ANSWERS_PER_HEALTH: u32 = 4;
 
 /// Reads targets, velocities and loads, and the health once a second.
@@ -24,7 +24,7 @@ pub(crate) struct TelemetryReader {
     is_driven: bool,
     /// Does the arm have hundredths, velocities and loads?
     is_fine: bool,
-    /// The shortest time between two questions; 0 where the line is fast enough for one at each report.
+    /// The shortest time between two reads; 0 if the line is fast enough for one read per report.
     period: Duration,
     next: Instant,
     health_period: Duration,
@@ -32,7 +32,7 @@ pub(crate) struct TelemetryReader {
 }
 
 impl TelemetryReader {
-    /// For an arm whose line has this baud rate, and that reports in this period.
+    /// `reports` is the period of the reports. `is_fine`: the arm has hundredths, velocities and loads.
     pub(crate) fn new(arm: &Arm, baud: u32, reports: Duration, is_driven: bool, is_fine: bool) -> Self {
         let answer = Duration::from_secs(1) * BITS / baud.max(1);
         let period = answer * SHARE_OF_LINE;
@@ -46,7 +46,7 @@ impl TelemetryReader {
         }
     }
 
-    /// What the arm tells now. Nothing on a slow line, until it is time again.
+    /// Reads the telemetry; empty if the next read is not due yet, as on a slow line.
     pub(crate) fn read(&mut self, arm: &mut Arm) -> Result<Telemetry, Error> {
         let now = arm.now();
         if now < self.next {
@@ -60,7 +60,7 @@ impl TelemetryReader {
         Ok(Telemetry { targets: self.is_driven.then_some(targets), motion })
     }
 
-    /// The health, once a second.
+    /// Reads the health once a second, or less often on a slow line; `None` if it is not due.
     pub(crate) fn health(&mut self, arm: &mut Arm) -> Result<Option<Health>, Error> {
         let now = arm.now();
         if now < self.next_health {

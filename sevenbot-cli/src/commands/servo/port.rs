@@ -16,7 +16,7 @@ pub(super) struct Rate {
     pub(super) rate: u32,
 }
 
-/// One of the eight rates of an SCS servo.
+/// Parses one of the eight rates of an SCS servo.
 pub(super) fn rate(text: &str) -> Result<u32, String> {
     let known = text.parse().ok().filter(|rate| BAUD_RATES.contains(rate));
     known.ok_or_else(|| format!("servos support {}", BAUD_RATES.map(|rate| rate.to_string()).join(", ")))
@@ -48,8 +48,8 @@ pub(super) fn open(session: &Session, baud: u32) -> Result<BusMaster, CommandErr
     BusMaster::open(&port, baud, options).map_err(|error| CommandError::Open { port, error })
 }
 
-/// The error of a failed exchange. If no servo answered, checks whether the port is an arm's host link, at the baud rate of
-/// this command: all rates would take seconds.
+/// The error of a failed exchange. If no servo answered, checks whether the port is an arm's host link. Tries only the --baud
+/// of this command: all rates would take seconds.
 pub(super) fn exchange_error(session: &Session, bus: BusMaster, error: ServoError) -> CommandError {
     let is_silent = matches!(
         error,

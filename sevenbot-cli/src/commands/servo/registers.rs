@@ -223,7 +223,7 @@ fn print(session: &mut Session, id: u8, values: Vec<ServoValue>, is_long: bool) 
     session.printer.print(&ServoValues { id, registers, is_long })
 }
 
-/// The settings as TOML.
+/// The EEPROM registers as TOML.
 fn toml(id: u8, values: &[ServoValue]) -> String {
     use sevenbot::servo_bench::register_table::ServoMemory;
 

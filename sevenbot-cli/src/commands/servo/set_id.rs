@@ -66,7 +66,6 @@ pub(super) fn run(session: &mut Session, args: &SetIdArgs) -> Result<(), Command
     }
 }
 
-/// Advice to the user.
 fn advice(error: &SetIdError) -> &'static [&'static str] {
     match error {
         SetIdError::NotAlone { answering } => not_alone(answering),

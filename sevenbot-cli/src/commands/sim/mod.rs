@@ -308,7 +308,7 @@ fn request(command: &SimCommand) -> Result<Value, CommandError> {
     })
 }
 
-/// The text of a scene, if it is one.
+/// Reads and checks the scene in a file. `off` stays `off`.
 fn scene(file: &Path) -> Result<String, CommandError> {
     if file == Path::new("off") {
         return Ok("off".to_owned());

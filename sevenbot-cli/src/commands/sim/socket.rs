@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 use crate::advice::START_SIMULATOR;
 use crate::command_error::CommandError;
 
-/// A simulator answers sooner than this.
+/// Time limit for a simulator's answer.
 const TIMEOUT: Duration = Duration::from_secs(20);
 
 /// A connection to a simulator.
@@ -22,8 +22,8 @@ pub(super) struct SimulatorConnection {
 }
 
 impl SimulatorConnection {
-    /// Connects to the simulator with this socket, or to the only one that is running. If several are running, to the one
-    /// with this port.
+    /// Connects to the simulator with this control socket. Without one, connects to the simulator whose arm has this port;
+    /// without either, to the only simulator that runs.
     pub(super) fn open(control: Option<&Path>, port: Option<&str>) -> Result<Self, CommandError> {
         if let Some(path) = control {
             return Self::connect(path).map_err(|reason| unreachable(path, &reason));
@@ -78,7 +78,7 @@ impl SimulatorConnection {
         Some(state.get("port")?.as_str()?.to_owned())
     }
 
-    /// Waits for the next answer without a time limit.
+    /// Removes the time limit for answers.
     pub(super) fn wait_forever(&mut self) -> Result<(), CommandError> {
         let set = self.stream.get_mut().set_read_timeout(None);
         set.map_err(|reason| unreachable(&self.path, &reason))
@@ -114,7 +114,7 @@ pub(crate) fn running_ports() -> Vec<String> {
     found.iter_mut().filter_map(SimulatorConnection::port).collect()
 }
 
-/// The default sockets, also of simulators that were killed.
+/// The control sockets in the default directory. Some may be left from simulators that were killed.
 fn sockets() -> Vec<PathBuf> {
     let is_control = |path: &PathBuf| {
         let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
@@ -127,7 +127,7 @@ fn sockets() -> Vec<PathBuf> {
     paths
 }
 
-/// Where host-sim puts them: see `host_sim::control::path`.
+/// The directory in which host-sim creates its control sockets: see `host_sim::control::path`.
 fn directory() -> Option<PathBuf> {
     let absolute = |name| env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute());
     let directory = absolute("XDG_RUNTIME_DIR").or_else(|| absolute("XDG_STATE_HOME"));

@@ -48,7 +48,7 @@ fn reports(out: &mut dyn Write, what: &str, reports: &[Value]) -> io::Result<()>
     Ok(())
 }
 
-/// The answer to a hand.
+/// The answer to `hand`.
 pub(super) fn hand(out: &mut dyn Write, joint: u8, value: &Value) -> io::Result<()> {
     write!(out, "joint {joint} is at {:.1} degrees", number(value, "angle_degrees"))?;
     if value.get("has_torque") == Some(&Value::Bool(true)) {
@@ -57,7 +57,7 @@ pub(super) fn hand(out: &mut dyn Write, joint: u8, value: &Value) -> io::Result<
     writeln!(out)
 }
 
-/// The answer to a snapshot, or to its restoration.
+/// The answer to `snapshot` or `restore`.
 pub(super) fn snapshot(out: &mut dyn Write, value: &Value) -> io::Result<()> {
     writeln!(out, "snapshot    {} at {:.3} s", string(value, "snapshot"), number(value, "time_us") / 1e6)
 }

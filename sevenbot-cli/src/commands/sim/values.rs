@@ -1,4 +1,4 @@
-//! The values of arguments: times, weights, speeds, and what a hand does.
+//! Parsers of arguments: times, weights, speeds, and actions of the hand.
 
 use serde_json::{Value, json};
 
@@ -32,7 +32,7 @@ pub(super) fn factor(text: &str) -> Result<Value, &'static str> {
     factor.map(|factor| json!(factor)).ok_or("use a factor from 0.001 to 1000, as 50x or 0.5, or max")
 }
 
-/// Parses what a hand does.
+/// Parses an action of the hand: an angle in degrees, `hold` or `let-go`.
 pub(super) fn hand(text: &str) -> Result<Value, &'static str> {
     match text {
         "hold" | "let-go" => Ok(json!(text)),

@@ -12,7 +12,7 @@ use super::input::TimedPoint;
 #[derive(Debug, Default)]
 pub(super) struct Feed {
     last: Option<TimedPoint>,
-    /// Was the last point itself taken, and not only points before it?
+    /// Has `take` returned the last point itself, because no later one was there?
     is_last_taken: bool,
     next: VecDeque<TimedPoint>,
 }
@@ -23,7 +23,7 @@ impl Feed {
         self.next.push_back(point);
     }
 
-    /// Is there no point later than those that were taken?
+    /// Are there no points whose time is still to come?
     pub(super) fn is_empty(&self) -> bool {
         self.next.is_empty()
     }
@@ -34,7 +34,7 @@ impl Feed {
         self.last.map_or(next, |last| next.min(last.time + period))
     }
 
-    /// The set-point at this time; `None` if its line has not come yet.
+    /// The set-point at this time; `None` if the input has no point yet, or none after the last one that was returned.
     pub(super) fn take(&mut self, time: Duration) -> Option<FineTargets> {
         while let Some(point) = self.next.pop_front_if(|point| point.time <= time) {
             (self.last, self.is_last_taken) = (Some(point), false);
@@ -49,7 +49,8 @@ impl Feed {
     }
 }
 
-/// The set-point between two. A joint without an angle in one of them gets that of the first.
+/// Interpolates between two set-points; `share` is 0 at `from` and 1 at `to`. A joint that has no angle in one of them keeps
+/// its value of `from`.
 fn between(from: &FineTargets, to: &FineTargets, share: f64) -> FineTargets {
     let mut joints = *from;
     for (joint, to) in joints.iter_mut().zip(to) {

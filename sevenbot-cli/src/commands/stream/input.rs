@@ -12,7 +12,7 @@ use sevenbot::fine::FineTargets;
 
 use crate::printer::warn;
 
-/// Lines that wait to be sent. The thread that reads stops there.
+/// Lines that may wait to be sent. Then the reading thread waits.
 const LINES_AHEAD: usize = 1_024;
 /// Later times are refused, so that the arithmetic cannot overflow.
 const LONGEST: Duration = Duration::from_secs(24 * 60 * 60);
@@ -53,7 +53,7 @@ pub(super) fn read_in_background() -> Receiver<Result<TimedPoint, String>> {
     receiver
 }
 
-/// The lines so far.
+/// The state of the parser after the lines so far.
 #[derive(Debug, Default)]
 struct InputLines {
     number: usize,

@@ -122,7 +122,7 @@ impl From<WatchdogActionArg> for WatchdogAction {
 
 /// Frequency of the reports, in Hz.
 const FEEDBACK_HZ: u8 = 50;
-/// The longest reaction time to a line or Ctrl-C.
+/// Time between two checks for new lines while the input pauses.
 const POLL_PERIOD: Duration = Duration::from_millis(2);
 /// One step of the watchdog's time, in milliseconds.
 const WATCHDOG_STEP_MS: u16 = 10;
@@ -207,7 +207,7 @@ struct Streamer<'a, 'b> {
     pace: StreamPace,
     source: PointSource,
     start: StreamStart,
-    /// `None` after the first warning, too.
+    /// `None`: it is switched off, or the warning was given.
     guard: Option<Guard>,
     tracking: &'b mut Tracking,
     period: Duration,
@@ -232,7 +232,7 @@ impl Streamer<'_, '_> {
             let Some(point) = self.source.feed.take(time) else { return Ok(true) };
             if let Some(first) = self.start.first.take(&point) {
                 self.approach(&first, interrupt)?;
-                // The time of the stream stands still meanwhile.
+                // The time of the stream does not advance during the approach.
                 start = time;
                 self.make_due();
             }

@@ -1,4 +1,4 @@
-//! What `stream` says at its end.
+//! The output of `stream` at its end.
 
 use std::io::{self, Write};
 use std::time::Duration;
@@ -9,7 +9,7 @@ use sevenbot::stream::PaceCounts;
 use super::tracking::TrackingError;
 use crate::printer::Printable;
 
-/// How the stream went.
+/// The statistics of a stream.
 #[derive(Debug, Serialize)]
 pub(super) struct StreamSummary {
     points: u32,

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use sevenbot::FineAngle;
 use sevenbot::fine::FineTargets;
 
-/// Points older than this are forgotten. No report is later.
+/// How long points are kept: longer than the largest delay, 1.5 periods of 1 s.
 const KEPT: Duration = Duration::from_secs(2);
 /// A target this far from the last point was written by another program, in degrees.
 const ELSEWHERE: f64 = 3.0;
@@ -14,7 +14,7 @@ const ELSEWHERE: f64 = 3.0;
 /// The points that were sent, and the errors so far.
 #[derive(Debug)]
 pub(super) struct Tracking {
-    /// From a point to the time when it is due in the arm.
+    /// The time from sending a point until the joints should be there.
     delay: Duration,
     sent: VecDeque<(Instant, [f64; 7])>,
     pose: [f64; 7],
@@ -34,7 +34,7 @@ pub(super) struct TrackingError {
 }
 
 impl Tracking {
-    /// From the targets at the start. The arm is at a point one and a half periods after the point came (D23).
+    /// Begins with the targets at the start. The arm is at a point one and a half periods after the point came (D23).
     pub(super) fn new(targets: [FineAngle; 7], period: Duration) -> Self {
         let pose = targets.map(FineAngle::degrees);
         let (sent, delay) = (VecDeque::new(), period * 3 / 2);
@@ -57,7 +57,8 @@ impl Tracking {
         self.pose
     }
 
-    /// The first joint whose target is no longer the last point, or the target at the start: its number, and both in degrees.
+    /// The first joint whose target in `targets` is more than 3 degrees from its last point (or its target at the start): its
+    /// number, the expected and the present target in degrees.
     pub(super) fn moved_from_outside(&self, targets: [f64; 7]) -> Option<(u8, f64, f64)> {
         let joints = (1..).zip(self.pose).zip(targets).map(|((joint, from), to)| (joint, from, to));
         joints.into_iter().find(|(_, from, to)| (from - to).abs() > ELSEWHERE)
@@ -84,7 +85,7 @@ impl Tracking {
         (self.count > 0).then_some(TrackingError { rms, largest, joint })
     }
 
-    /// The place on the way through the points at this time; `None` before the first and after the last.
+    /// The interpolated pose at this time; `None` before the first point and after the last.
     fn at(&self, time: Instant) -> Option<[f64; 7]> {
         let pairs = self.sent.iter().zip(self.sent.iter().skip(1));
         let ((from_time, from), (to_time, to)) =

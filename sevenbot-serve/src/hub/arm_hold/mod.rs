@@ -23,18 +23,18 @@ use protocol_core::time::{Duration, Instant};
 use super::angles::{Angles, DEGREE, UNMEASURED, angles_in, limits_in};
 use super::held_targets::HeldTargets;
 
-/// After so many replies that do not confirm the hold it has failed.
+/// The hold has failed after this many replies that do not confirm it.
 const MOST_ROUNDS: u8 = 10;
-/// A read without a reply is repeated after this time, behind another brake.
+/// A read without a reply is repeated after this time. The brake is written again before it.
 const REPEAT_PERIOD: Duration = Duration::from_millis(100);
-/// A hold is repeated this often until each joint whose set-point moves was measured: for 0.2 s or more. It takes
-/// 0.2 s after power-up.
+/// How often a hold is repeated while a joint whose set-point moves was not measured yet. The repeats take 0.2 s or more, and
+/// measuring takes 0.2 s after power-up.
 const MOST_REPEATS: u8 = 40;
 
 /// A frame to write: the first register, and the values.
 pub(crate) type Frame = (u8, Vec<u8>);
 
-/// What is restored once the arm holds.
+/// The value that is being restored once the arm holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Restoring {
     /// The set-point period.
@@ -48,36 +48,36 @@ pub(crate) enum Restoring {
 pub(crate) struct ArmHold {
     /// The arm has positions in hundredths of a degree, and tells which joints move.
     is_fine: bool,
-    /// Targets are points of a stream, and older points may be ahead of the newest one.
+    /// The set-point period is not 0: targets are points of a stream, and older points may still be ahead of the newest one.
     is_streaming: bool,
     /// The joints to hold at their positions, one bit each; `None`: not known yet.
     moving: Option<u8>,
-    /// Those of them whose set-points move, one bit each.
+    /// The joints of `moving` whose set-points move, one bit each.
     driven: u8,
-    /// A joint whose set-point moves was not measured yet: it goes on once it is.
+    /// A joint whose set-point moves was not measured yet. It goes on moving once it is measured.
     has_unmeasured: bool,
     repeats: u8,
     /// Replies so far.
     rounds: u8,
     sent: Vec<Frame>,
-    /// Joints that a client held after the first read without a reply was sent, one bit each.
+    /// Joints that a client held after the pending read was first sent, one bit each.
     held_meanwhile: u8,
-    /// When the read is repeated that has no reply yet; `None`: the next one is due.
+    /// When to repeat the read that has no reply yet; `None`: the next read is due now.
     repeat_at: Option<Instant>,
     /// All joints have to be slowed down before the next read.
     is_brake_due: bool,
     /// The arm holds.
     is_done: bool,
-    /// It holds, and this is being restored.
+    /// The arm holds, and this is being restored.
     restoring: Option<Restoring>,
     /// The arm did not take back something that was to be restored.
     is_unrestored: bool,
-    /// Another hold was wanted meanwhile: what this one has read may be older than that.
+    /// Another hold was requested meanwhile. It has to follow, because this one may have read the arm before that request.
     is_wanted_again: bool,
 }
 
 impl ArmHold {
-    /// A hold of an arm of which nothing is known.
+    /// A hold that has read nothing from the arm yet.
     pub(crate) const fn new(is_fine: bool, is_streaming: bool) -> Self {
         // Without the status block every joint may move.
         let moving = if is_fine { None } else { Some(u8::MAX) };
@@ -100,12 +100,12 @@ impl ArmHold {
         }
     }
 
-    /// Another hold has to follow this one.
+    /// Notes that another hold has to follow this one.
     pub(crate) const fn want_again(&mut self) {
         self.is_wanted_again = true;
     }
 
-    /// Has another hold to follow?
+    /// Does another hold have to follow?
     pub(crate) const fn is_wanted_again(&self) -> bool {
         self.is_wanted_again
     }
@@ -116,7 +116,7 @@ impl ArmHold {
         Some(Self { repeats, is_brake_due: false, ..Self::new(self.is_fine, self.is_streaming) })
     }
 
-    /// A client holds the joints that have a target here: what was read of them before is out of date.
+    /// Notes that a client holds the joints that have a target here. What a pending read shows of them is out of date.
     pub(crate) fn note_held(&mut self, targets: &Angles) {
         let held = Joint::ALL.into_iter().zip(targets).filter(|(_, target)| target.is_some());
         self.held_meanwhile = held.fold(self.held_meanwhile, |bits, (joint, _)| bits | joint.bit());
@@ -147,34 +147,34 @@ impl ArmHold {
         self.repeat_at.unwrap_or(Instant::ZERO)
     }
 
-    /// Have all joints to be slowed down before the read that is sent now?
+    /// Do all joints have to be slowed down before the read that is sent now? True once for each brake.
     pub(crate) const fn take_brake(&mut self) -> bool {
         std::mem::replace(&mut self.is_brake_due, false)
     }
 
-    /// The arm holds: what is left is to be restored, this next.
+    /// The arm holds: begins to restore `what`.
     pub(crate) const fn restore(mut self, what: Restoring) -> Self {
         (self.restoring, self.rounds, self.repeat_at) = (Some(what), 0, None);
         self
     }
 
-    /// What is being restored.
+    /// The value that is being restored; `None`: the hold is not at that step.
     pub(crate) const fn restoring(&self) -> Option<Restoring> {
         self.restoring
     }
 
-    /// It was written, and has to be read.
+    /// The values to restore were written, and have to be read back.
     pub(crate) const fn verify(&mut self) {
         self.repeat_at = None;
         self.rounds += 1;
     }
 
-    /// The arm did not take it back.
+    /// Notes that the arm did not take back what was to be restored.
     pub(crate) const fn give_up_restoring(&mut self) {
         self.is_unrestored = true;
     }
 
-    /// Did the arm not take back something?
+    /// Is there something that the arm did not take back?
     pub(crate) const fn is_unrestored(&self) -> bool {
         self.is_unrestored
     }
@@ -194,12 +194,13 @@ impl ArmHold {
         self.is_done && !self.has_unmeasured
     }
 
-    /// The frames to write for this reply.
+    /// Processes a reply, and returns the frames to write.
     pub(crate) fn frames(&mut self, address: u8, values: &[u8], held: &HeldTargets) -> Vec<Frame> {
         self.repeat_at = None;
         self.rounds += 1;
         let Some(moving) = self.moving else {
-            // The set-point of a silent joint stands still, and would go on to its target.
+            // `values` are the silent and the moving joints. The set-point of a silent joint stands still, but goes on to its
+            // target when the joint answers.
             let moving = values.iter().fold(0, |bits, value| bits | value);
             self.moving = Some(moving);
             self.driven = values.last().copied().unwrap_or_default();
@@ -223,7 +224,7 @@ impl ArmHold {
         self.sent.clone()
     }
 
-    /// One frame for each row of joints that get a target.
+    /// One frame for each run of adjacent joints that get a target.
     fn frames_that_hold(&self, moving: u8, address: u8, values: &[u8], held: &HeldTargets) -> Vec<Frame> {
         let (targets, positions) = self.rows();
         let [present, measured] = [targets, positions].map(|row| angles_in(row, address, values));
@@ -236,7 +237,7 @@ impl ArmHold {
                 0 => target,
                 _ => position.and_then(|position| self.held_target(joint, position, target, held)),
             };
-            // The points of a stream that are ahead would move a joint which keeps its target.
+            // In a stream, write the target of a joint that keeps it, too: the points ahead would move the joint.
             *wanted = kept.map_or(position, |kept| self.is_streaming.then_some(kept));
         }
         let present = present.map(Option::unwrap_or_default);
@@ -245,7 +246,7 @@ impl ArmHold {
         joined(wanted.filter_map(|(joint, wanted)| Some((targets.of(joint), self.bytes(wanted?)))))
     }
 
-    /// The target of a joint that was held before: as it was read, or one that a client wrote meanwhile.
+    /// The target that holds a joint already, if it is the one that was read, or one that a client wrote meanwhile.
     fn held_target(&self, joint: Joint, position: u16, read: Option<u16>, held: &HeldTargets) -> Option<u16> {
         let is_newer = self.held_meanwhile & joint.bit() != 0;
         held.near(joint, position).filter(|&target| is_newer || Some(target) == read)
@@ -260,7 +261,7 @@ impl ArmHold {
     }
 }
 
-/// One frame for writes of which each begins where the one before ends.
+/// Joins writes to consecutive registers into one frame.
 pub(crate) fn joined(writes: impl Iterator<Item = Frame>) -> Vec<Frame> {
     let mut frames: Vec<Frame> = Vec::new();
     for (address, bytes) in writes {

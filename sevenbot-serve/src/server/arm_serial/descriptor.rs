@@ -21,7 +21,7 @@ impl ArmSerial {
         Ok(Self { port, readiness })
     }
 
-    /// Reads bytes that have arrived. Fewer than asked for: there are no more.
+    /// Reads bytes that have arrived. If it returns fewer than asked for, no more have arrived.
     pub(crate) fn read(&self, bytes: &mut [u8]) -> io::Result<usize> {
         self.port.read(bytes)
     }

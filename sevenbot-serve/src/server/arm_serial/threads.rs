@@ -1,5 +1,5 @@
-//! The port by a thread, for systems without readiness of serial ports. It reads and writes in turn: Windows does one of both
-//! at a time with a port, so a read that waits would hold up a write.
+//! The port served by a thread, for systems that do not report the readiness of serial ports. The thread reads and writes in
+//! turn: on Windows a port does one of both at a time, so a read that waits delays a write.
 //!
 //! ```text
 //!   port ──▶ thread ──▶ inbox ──▶ read()
@@ -17,7 +17,7 @@ use tokio::sync::Notify;
 
 use crate::server::shared::lock;
 
-/// How long a read waits for its first byte, and so a write for its turn.
+/// How long a read waits for its first byte, and so the longest delay of a write.
 const READ_TIMEOUT: Duration = Duration::from_millis(5);
 /// A port that takes no bytes for this long has failed.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(2);
@@ -64,7 +64,7 @@ impl ArmSerial {
         Ok(Self(state))
     }
 
-    /// Reads bytes that have arrived. Fewer than asked for: there are no more.
+    /// Reads bytes that have arrived. If it returns fewer than asked for, no more have arrived.
     pub(crate) fn read(&self, bytes: &mut [u8]) -> io::Result<usize> {
         let mut boxes = lock(&self.0.boxes);
         if let (true, Some(failure)) = (boxes.inbox.is_empty(), boxes.failure) {
