@@ -171,7 +171,7 @@ impl Approach {
     /// of `end` all the way.
     #[must_use]
     pub fn recording(&self, end: Moment) -> Recording {
-        let count = u32::try_from(self.duration.as_millis() / MOMENT.as_millis()).unwrap_or(u32::MAX);
+        let count = u32::try_from(self.duration.as_millis().div_ceil(MOMENT.as_millis())).unwrap_or(u32::MAX);
         let moments = (0..count).map(|number| {
             let time = MOMENT.saturating_mul(number);
             let mut pose = end.pose;

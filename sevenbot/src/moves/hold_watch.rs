@@ -90,7 +90,7 @@ impl Arm {
     /// # Errors
     /// The motors do not drive the joints, a joint is silent, blocked or let go, a servo has an alarm, the supply was lost, the
     /// controller restarted, another program wrote a target, or an exchange failed. [`MoveError::NotHeld`] if a joint is further
-    /// than 10 degrees from its target at the end, and further than at the start.
+    /// than 10 degrees from its target at the end, and further than at the start, or still gives way after 2 seconds.
     pub fn watch_hold(&mut self) -> Result<(), MoveError> {
         let mut check = MoveCheck::begin(self, bits(Joint::ALL))?;
         let mut begun = self.joints()?;
@@ -100,9 +100,18 @@ impl Arm {
             let joints = self.joints()?;
             // Check after the read of the joints: a restart changes targets, too, and this names it.
             check.check(self)?;
-            if joints.targets() != begun.targets() {
-                if self.now() >= longest || !are_own_targets(&begun, &joints) {
+            let changed: Vec<_> = Joint::ALL
+                .into_iter()
+                .filter(|joint| joints.target(*joint) != begun.target(*joint))
+                .collect();
+            if !changed.is_empty() {
+                // A target near its joint was changed by the arm, any other by another program.
+                if changed.iter().any(|joint| distance(&joints, *joint) > OWN_TARGET_DEGREES) {
                     return Err(MoveError::OtherTargets);
+                }
+                if self.now() >= longest {
+                    let gives_way = |joint| (joint, joints.present(joint), begun.target(joint));
+                    return Err(MoveError::NotHeld { away: changed.into_iter().map(gives_way).collect() });
                 }
                 (begun, end) = (joints.clone(), self.now() + WATCH_TIME);
             }
@@ -127,15 +136,13 @@ impl Arm {
     }
 }
 
-/// Is each changed target near its joint? Then the arm changed it, not another program.
-fn are_own_targets(before: &JointSnapshot, now: &JointSnapshot) -> bool {
-    let mut changed = Joint::ALL.into_iter().filter(|joint| now.target(*joint) != before.target(*joint));
-    changed.all(|joint| now.present(joint).abs_diff(now.target(joint)) <= OWN_TARGET_DEGREES)
+/// The distance of a joint from its target, in degrees.
+fn distance(joints: &JointSnapshot, joint: Joint) -> u8 {
+    joints.present(joint).abs_diff(joints.target(joint))
 }
 
 /// Fails if something drags joints away from their targets.
 fn check_held(begun: &JointSnapshot, now: &JointSnapshot) -> Result<(), MoveError> {
-    let distance = |joints: &JointSnapshot, joint| joints.present(joint).abs_diff(joints.target(joint));
     let away = Joint::ALL
         .into_iter()
         .filter(|joint| distance(now, *joint) > distance(begun, *joint).max(HELD_DEGREES));
