@@ -1,12 +1,12 @@
-//! The links and joints of the arm as a tree, for formats that know no closed loop.
+//! The links and joints of the arm as a tree, for formats without closed loops.
 //!
 //! ```text
 //!   base_link ─joint_1─▶ turret ─joint_2─▶ rear_arm ─elbow─▶ elbow_link ─joint_3─▶ forearm
 //!     ─joint_4─▶ wrist ─joint_5─▶ hand ─joint_6─▶ disc ─▶ tip, disc_edge
 //! ```
 //!
-//! The parallelogram makes joint 3 turn the forearm from the horizontal, whatever joint 2 does. In the tree, the joint
-//! `elbow` turns back what joint 2 turned, so the angle of joint 3 is that of the arm.
+//! Because of the parallelogram, joint 3 sets the angle of the forearm to the horizontal, independent of joint 2. In the tree,
+//! the joint `elbow` cancels the rotation by joint 2, so `joint_3` has the angle of joint 3 of the arm.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -20,7 +20,7 @@ use crate::TIP;
 /// A point or a direction: x forward, y to the left, z up.
 pub(crate) type Axes = [f64; 3];
 
-/// From millimetres to metres.
+/// Converts millimetres to metres.
 pub(crate) const fn m(millimetres: f64) -> f64 {
     millimetres / 1000.0
 }
@@ -28,7 +28,7 @@ pub(crate) const fn m(millimetres: f64) -> f64 {
 /// The speed of a joint without load, in rad/s: 62 rpm.
 pub(crate) const MAX_SPEED: f64 = 6.49;
 
-/// A cylinder that shows a part.
+/// A cylinder that represents a part, in metres.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Solid {
     pub(crate) from: Axes,
@@ -51,13 +51,13 @@ pub(crate) struct Link {
     pub(crate) joint: Option<ModelJoint>,
 }
 
-/// A joint between a link and the one before it.
+/// The joint between a link and its parent.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ModelJoint {
     pub(crate) name: &'static str,
-    /// The link that carries it.
+    /// The link that carries the joint.
     pub(crate) parent: &'static str,
-    /// Its position in that link.
+    /// The position of the joint in its parent, in metres.
     pub(crate) origin: Axes,
     pub(crate) motion: Motion,
 }
@@ -72,7 +72,7 @@ pub(crate) enum Motion {
         low: f64,
         high: f64,
     },
-    /// Turns about an axis by the negative angle of another joint, which has the same range.
+    /// Turns about an axis by the negative angle of the joint `of`, which has the same range.
     TurnBack {
         axis: Axes,
         of: &'static str,
@@ -123,7 +123,7 @@ pub(crate) const DISC_SOLIDS: &[Solid] = &[
     solid([-5.0, DISC_RADIUS - 2.0, 0.0], [2.0, DISC_RADIUS - 2.0, 0.0], 2.0),
 ];
 
-/// All links, each after the one that carries it.
+/// All links, each after its parent.
 pub(crate) const LINKS: [Link; 10] = [
     Link { name: "base_link", solids: BASE_SOLIDS, joint: None },
     Link {

@@ -18,16 +18,16 @@ use crate::chain::{Axes, LINKS, Link};
 use crate::look::of_link;
 use crate::mesh::Mesh;
 
-/// glTF has y up, z forward and x to the left: a third of a turn about the diagonal.
+/// Rotates to the axes of glTF, where y is up, z forward and x to the left: a third of a turn about the diagonal.
 const FROM_Z_UP: UnitQuaternion = UnitQuaternion([-0.5, -0.5, -0.5, 0.5]);
-/// Bytes of three numbers.
+/// Bytes of three `f32`.
 const VECTOR_BYTES: usize = 12;
 
-/// The arm as binary glTF (GLB), in the straight pose. The nodes are the links; those of a joint turn about the axis
-/// that the URDF names.
+/// The arm as binary glTF (GLB), in the straight pose. The nodes are the links. To move a joint, turn the node of its link
+/// about the axis of the joint in the URDF.
 ///
 /// # Errors
-/// None in practice: the bytes are written to memory.
+/// The bytes cannot be encoded. This does not happen in practice, because they are written to memory.
 ///
 /// ```
 /// assert!(arm_model::glb()?.starts_with(b"glTF"));
@@ -47,7 +47,7 @@ pub fn glb() -> io::Result<Vec<u8>> {
     file.finish()
 }
 
-/// A glTF file as it is written: its description, and the bytes of its meshes.
+/// A glTF file under construction: its description, and the bytes of its meshes.
 struct File {
     root: Root,
     bytes: Vec<u8>,
@@ -137,7 +137,7 @@ impl File {
         })
     }
 
-    /// The scene: the base in the axes of glTF.
+    /// Adds the scene: the base, rotated to the axes of glTF.
     fn scene(&mut self, base: Vec<Index<Node>>) {
         let upright = self.root.push(Node {
             children: Some(base),

@@ -2,19 +2,19 @@
 //!
 //! ```text
 //!   kinematics::geometry ──▶ chain: links and joints ──▶ urdf: a tree, the elbow by a mimic joint
-//!                   │               │                └──▶ glb: nodes with meshes, in the standard pose
+//!                   │               │                └──▶ glb: nodes with meshes, in the straight pose
 //!                   │               └── the same ────▶ mjcf: the parallelogram closed by an equality constraint
 //!                   │               └── the same ────▶ transforms: where each link is in its parent
 //!                   └──▶ look: meshes of the bodies; pose: where they are, for programs that draw the arm
 //! ```
 //!
 //! Lengths are metres and angles radians, axes as in REP-103: x forward, y to the left, z up. All angles of the joints
-//! are 0 in the straight pose: the arm forward, the rear arm upright, forearm and hand level. There all links have the
+//! are 0 in the straight pose: the arm forward, the rear arm upright, forearm and hand level. In this pose all links have the
 //! axes of the base. [`joint_angles`] converts the degrees of the registers.
 //!
-//! Shapes of URDF and MJCF are cylinders along the axes of the parts; those of glTF are the meshes of [`Body`]. They show
-//! the arm; what the kinematics does not name is not measured. Joint 7, the claw, moves no point, and the three models
-//! have none.
+//! Shapes of URDF and MJCF are cylinders along the axes of the parts; those of glTF are meshes as in [`Body`]. The shapes are
+//! for display: dimensions that [`kinematics::geometry`] does not define are estimates. The three models leave out joint 7,
+//! the claw, which moves no point of the kinematics.
 //!
 //! ```
 //! let urdf = arm_model::urdf()?;
@@ -48,10 +48,10 @@ pub const ZERO_DEGREES: [f64; 6] = [90.0, 90.0, 65.0, 90.0, 90.0, 90.0];
 /// The names of joints 1 to 6 in all formats.
 pub const JOINT_NAMES: [&str; 6] = ["joint_1", "joint_2", "joint_3", "joint_4", "joint_5", "joint_6"];
 
-/// The name of the link at the tip: x points along the tool.
+/// The name of the link at the tip of the tool. Its x axis points along the tool.
 pub const TIP: &str = "tip";
 
-/// The angles of the model's joints 1 to 6 in radians, from those of the registers in degrees.
+/// Converts the angles of joints 1 to 6 from the degrees of the registers to the radians of the model.
 ///
 /// ```
 /// let angles = arm_model::joint_angles([180.0, 90.0, 65.0, 90.0, 90.0, 90.0]);
@@ -66,7 +66,7 @@ pub fn joint_angles(degrees: [f64; 6]) -> [f64; 6] {
     angles
 }
 
-/// The description in every format.
+/// The description that each format contains as a comment or a note.
 const ABOUT: [&str; 4] = [
     "7Bot V2 arm, written by `sevenbot model`. Metres and radians; x forward, y to the left, z up (REP-103).",
     "A joint's angle is (register - zero) degrees in radians. Zeros of joints 1 to 6: 90 90 65 90 90 90.",

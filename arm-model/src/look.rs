@@ -1,7 +1,6 @@
-//! What the arm looks like: the meshes of its bodies, in the axes of their links, in mm.
+//! The appearance of the arm: the meshes of its bodies, in the axes of their links, in mm.
 //!
-//! Joints and their distances are those of [`kinematics::geometry`]. Widths and thicknesses are estimates; they make
-//! the model look like an arm for a desk.
+//! Joints and their distances are those of [`kinematics::geometry`]. Widths and thicknesses are estimates.
 
 use kinematics::geometry::{
     BASE_HEIGHT, BASE_RADIUS, DISC_RADIUS, ELBOW_OFFSET, FINGER_AXIS, FINGER_BEND, FINGER_END, FOREARM,
@@ -15,15 +14,15 @@ use crate::mesh::{Mesh, MeshAxis};
 /// A rigid body of the arm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Body {
-    /// Stands on the table.
+    /// The base, which stands on the table.
     Base,
     /// Turned by joint 1.
     Turret,
     /// From the shoulder to the elbow, turned by joint 2.
     RearArm,
-    /// At the shoulder, turned by joint 3.
+    /// The lever of the parallelogram at the shoulder, turned by joint 3.
     Lever,
-    /// From the lever to the forearm.
+    /// The rod of the parallelogram, from the lever to the forearm.
     Rod,
     /// From the elbow to the wrist, turned by joint 3.
     Forearm,
@@ -33,9 +32,9 @@ pub enum Body {
     Hand,
     /// The disc and the palm of the claw, turned by joint 6.
     Disc,
-    /// The finger of the claw at the edge of the disc that its direction names, moved by joint 7.
+    /// The finger of the claw on the side to which the y axis of the disc points, moved by joint 7.
     Finger,
-    /// The finger opposite.
+    /// The opposite finger of the claw, moved by joint 7.
     OppositeFinger,
 }
 
@@ -111,13 +110,13 @@ fn both_sides(mesh: &mut Mesh, circles: &[(Axes, f64)], [near, far]: [f64; 2]) {
     mesh.plate(Shell, MeshAxis::Y, circles, [-far, -near]);
 }
 
-/// Hubs on an axis to the left and to the right.
+/// Adds hubs on an axis, on the left and on the right.
 fn hubs(mesh: &mut Mesh, centre: Axes, radius: f64, [near, far]: [f64; 2]) {
     mesh.cylinder(Accent, MeshAxis::Y, centre, radius, [near, far]);
     mesh.cylinder(Accent, MeshAxis::Y, centre, radius, [-far, -near]);
 }
 
-/// A box with round edges along y.
+/// Adds a box with rounded edges along y.
 fn rounded_box(mesh: &mut Mesh, finish: crate::Finish, [x0, x1]: [f64; 2], [z0, z1]: [f64; 2], width: f64) {
     let corners = [at(x0, z0), at(x1, z0), at(x1, z1), at(x0, z1)].map(|[x, y, z]| {
         let inward = |value: f64, low: f64, high: f64| value.clamp(low + 3.0, high - 3.0);
@@ -194,13 +193,13 @@ fn hand(mesh: &mut Mesh) {
     mesh.cylinder(Shell, MeshAxis::X, ORIGIN, 11.0, [9.0, TOOL - 5.0]);
 }
 
-/// The disc, and a pin that shows its direction.
+/// Adds the disc, and a pin that shows its direction.
 fn disc(mesh: &mut Mesh) {
     mesh.cylinder(Accent, MeshAxis::X, ORIGIN, DISC_RADIUS, [-5.0, 0.0]);
     mesh.cylinder(Dark, MeshAxis::X, [0.0, DISC_RADIUS - 3.5, 0.0], 2.5, [-1.0, 3.0]);
 }
 
-/// What carries the fingers.
+/// Adds the palm, which carries the fingers.
 fn palm(mesh: &mut Mesh) {
     let [ahead, aside] = FINGER_AXIS;
     let left = [ahead - 2.0, aside, 0.0];
@@ -209,7 +208,7 @@ fn palm(mesh: &mut Mesh) {
     mesh.plate(Dark, MeshAxis::Z, &[foot[0], foot[1], (left, 6.0), (right, 6.0)], [-6.0, 6.0]);
 }
 
-/// A finger from its axis on: the one on the left for a `side` of 1, the opposite one for -1.
+/// Adds a finger from its axis on: the left finger for a `side` of 1, the right one for -1.
 fn finger(mesh: &mut Mesh, side: f64) {
     let bone = |points: [[f64; 2]; 2], radii: [f64; 2]| {
         let [[x0, y0], [x1, y1]] = points;
@@ -221,7 +220,7 @@ fn finger(mesh: &mut Mesh, side: f64) {
     mesh.plate(Shell, MeshAxis::Z, &bone([FINGER_BEND, FINGER_END], [4.0, 2.5]), [-8.0, 8.0]);
 }
 
-/// The meshes of the links of the models, in mm. Those have neither rod nor claw.
+/// The mesh of a link of the chain, in mm. The chain has neither lever, rod nor claw. `None`: the link has no shape.
 pub(crate) fn of_link(name: &str) -> Option<Mesh> {
     let mut mesh = Mesh::default();
     let add: fn(&mut Mesh) = match name {

@@ -4,19 +4,19 @@ use std::f64::consts::TAU;
 
 use crate::chain::Axes;
 
-/// Sides of a full circle.
+/// Number of sides of the polygon that replaces a circle.
 const SIDES: u32 = 20;
 /// The width of the chamfer of all edges, in mm.
 const CHAMFER: f64 = 1.2;
 
-/// What a triangle shows.
+/// The kind of part that a triangle belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Finish {
     /// The structure.
     Shell,
     /// A servo or another dark part.
     Dark,
-    /// A hub or another part that names the joint.
+    /// A hub or another part that marks a joint.
     Accent,
 }
 
@@ -40,7 +40,7 @@ pub(crate) enum MeshAxis {
 }
 
 impl MeshAxis {
-    /// The two coordinates across the axis and the one along it, as x, y, z.
+    /// Converts the two coordinates across the axis and the one along the axis to x, y, z.
     fn xyz(self, [u, v, w]: Axes) -> Axes {
         match self {
             Self::X => [w, u, v],
@@ -141,7 +141,7 @@ impl Mesh {
     }
 
     /// Adds a plate: the convex hull of circles (a point in the plane across `axis` and a radius), between two
-    /// coordinates along the axis. Radii are larger than the chamfer of 1.2 mm.
+    /// coordinates along the axis. Radii must be larger than the chamfer of 1.2 mm.
     pub(crate) fn plate(&mut self, finish: Finish, axis: MeshAxis, circles: &[(Axes, f64)], ends: [f64; 2]) {
         let outline = hull(circles.iter().flat_map(|&(centre, radius)| {
             let centre = axis.across(centre);
@@ -188,7 +188,7 @@ fn hull(points: impl Iterator<Item = OutlinePoint>) -> Vec<OutlinePoint> {
     lower
 }
 
-/// One side of the hull of sorted points, without the last point.
+/// One side of the hull of sorted points, without its last point, with which the other side begins.
 fn half_hull(points: impl Iterator<Item = OutlinePoint>) -> Vec<OutlinePoint> {
     let mut side: Vec<OutlinePoint> = Vec::new();
     for point in points {
@@ -223,7 +223,8 @@ fn single(value: f64) -> f32 {
 mod tests {
     use super::*;
 
-    /// The sum of the tetrahedra to the origin: the volume, if the solid is closed and all triangles face outward.
+    /// The sum of the signed tetrahedra between the triangles and the origin. It is the volume if the solid is closed and all
+    /// triangles face outward.
     fn volume(mesh: &Mesh) -> f64 {
         mesh.positions
             .chunks(3)

@@ -7,8 +7,8 @@
 //!   shoulder ●──────● end of the lever
 //! ```
 //!
-//! Joint 2 turns the rear arm and joint 3 the lever, both about the shoulder. The elbow and the rod are passive. Masses and
-//! servos are those of the simulator, [`arm_sim::parameters`].
+//! Joint 2 turns the rear arm and joint 3 the lever, both about the shoulder. The joints of the elbow and the rod are passive.
+//! Masses and servos are those of the simulator, [`arm_sim::parameters`].
 
 use std::io;
 
@@ -32,18 +32,18 @@ use crate::{JOINT_NAMES, TIP};
 
 const QUARTER: [f64; 2] = [-std::f64::consts::FRAC_PI_2, std::f64::consts::FRAC_PI_2];
 const ORIGIN: Axes = [0.0; 3];
-/// The end of the lever, relative to the shoulder. The rod ends at the same distance behind the elbow.
+/// The end of the lever relative to the shoulder, in metres. The rod ends at the same distance behind the elbow.
 const LEVER_END: Axes = [m(-LEVER), 0.0, 0.0];
 const RADIUS: f64 = m(4.0);
-/// A body that the simulator gives no mass, in kilograms.
+/// The mass of a body that has none in the simulator, in kilograms. MuJoCo needs one.
 const LIGHT: f64 = 0.001;
-/// The inertia of a body about its centre, in kilogram square metres: the simulator has point masses.
+/// The inertia of a body about its centre, in kilogram square metres. Small, because the simulator has point masses.
 const POINT: f64 = 1e-6;
 
 /// The arm in the format of MuJoCo.
 ///
 /// # Errors
-/// None in practice: the text is written to memory.
+/// The text cannot be written. This does not happen in practice, because it is written to memory.
 ///
 /// ```
 /// let text = arm_model::mjcf()?;
@@ -79,10 +79,10 @@ fn text(name: &'static str, value: &str) -> (&'static str, String) {
     (name, value.to_owned())
 }
 
-/// Parts of the arm do not collide with each other, but with everything else.
+/// The defaults. Parts of the arm collide with everything but other parts of the arm.
 fn defaults(out: &mut XmlDocument) -> io::Result<()> {
     out.begin("default", &[])?;
-    // Of the passive joints.
+    // The values of the passive joints. The servo classes override them.
     out.empty("joint", &[text("damping", "0.001"), text("armature", "0.0001")])?;
     out.empty("geom", &[text("contype", "1"), text("conaffinity", "0"), text("type", "cylinder")])?;
     for class in [LARGE, SMALL] {
@@ -98,7 +98,7 @@ fn defaults(out: &mut XmlDocument) -> io::Result<()> {
 /// A make of servo.
 struct ServoClass {
     name: &'static str,
-    /// A joint that has it.
+    /// A joint with a servo of this class.
     joint: Joint,
 }
 
@@ -112,12 +112,12 @@ fn class_of(name: &str) -> Option<(&'static str, String)> {
     Some(text("class", if is_large { LARGE.name } else { SMALL.name }))
 }
 
-/// From micronewton metres to newton metres.
+/// Converts micronewton metres to newton metres.
 fn millionths(value: i64) -> f64 {
     value as f64 / 1e6
 }
 
-/// Newton metres for each radian of error.
+/// The stiffness of a servo's control, in newton metres per radian of error.
 fn stiffness(servo: &ServoParameters) -> f64 {
     millionths(servo.stall_torque) / thousandths(FULL_DUTY_ERROR).to_radians()
 }
@@ -126,7 +126,7 @@ fn thousandths(value: i64) -> f64 {
     value as f64 / 1e3
 }
 
-/// A driven joint: its own voltage drags the motor.
+/// The attributes of a driven joint. Its damping is the back EMF of the motor.
 fn joint_of(servo: &ServoParameters) -> [(&'static str, String); 3] {
     let drag = millionths(servo.stall_torque) / thousandths(NO_LOAD_SPEED).to_radians();
     [
@@ -207,13 +207,13 @@ fn body(out: &mut XmlDocument, name: &str, position: Axes, solids: &[Solid]) -> 
     Ok(())
 }
 
-/// The mass of the body in kilograms, and its centre.
+/// Writes the mass of the body in kilograms, and its centre.
 fn mass(out: &mut XmlDocument, kilograms: f64, centre: Axes) -> io::Result<()> {
     let inertia = ("diaginertia", triple([POINT; 3]));
     out.empty("inertial", &[("mass", number(kilograms)), ("pos", triple(centre)), inertia])
 }
 
-/// A joint, with its servo if it is one of joints 1 to 6.
+/// Writes a joint, with the class of its servo if it is one of joints 1 to 6.
 fn hinge(out: &mut XmlDocument, name: &str, axis: Axes, range: [f64; 2]) -> io::Result<()> {
     let range = range.map(number).join(" ");
     let mut words = vec![text("name", name), text("type", "hinge"), ("axis", triple(axis)), ("range", range)];

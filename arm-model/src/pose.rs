@@ -1,4 +1,4 @@
-//! Where the bodies of the arm are, from the angles of its joints.
+//! The poses of the bodies of the arm, computed from the angles of its joints.
 
 use kinematics::geometry::{FINGER_AXIS, LEVER, REAR_ARM};
 use kinematics::{Frames, Vector, forward};
@@ -29,7 +29,7 @@ impl Pose {
         self.origin + self.x * x + self.y * y + self.z * z
     }
 
-    /// The same body turned about its z axis through a point in its axes.
+    /// The pose of a body whose origin is this point of the present body, and which is turned about the present z axis.
     fn turned_about_z(&self, [x, y]: [f64; 2], degrees: f64) -> Self {
         let (sine, cosine) = degrees.to_radians().sin_cos();
         let along = self.x * cosine + self.y * sine;
@@ -37,8 +37,8 @@ impl Pose {
     }
 }
 
-/// Where all bodies are at these angles of joints 1 to 7, in degrees as the registers have them. The claw is closed at 0
-/// degrees of joint 7; each finger turns by half of its angle.
+/// The poses of all bodies at these angles of joints 1 to 7, in degrees as in the registers. The claw is closed at 0 degrees
+/// of joint 7; each finger turns by half of the angle of joint 7.
 #[must_use]
 pub fn poses([t1, t2, t3, t4, t5, t6, t7]: [f64; 7]) -> [(Body, Pose); 11] {
     let Frames { arm, hand } = forward([t1, t2, t3, t4, t5, t6]);

@@ -6,13 +6,13 @@ use crate::ABOUT;
 use crate::chain::{Axes, LINKS, Link, MAX_SPEED, ModelJoint, Motion, Solid};
 use crate::xml::{XmlDocument, number, triple};
 
-/// The torque limit that URDF demands, in Nm; the stall torque of the servos is not measured.
+/// The torque limit, which URDF requires, in Nm. Assumed: the stall torque of the servos is not measured.
 const EFFORT: f64 = 2.0;
 
 /// The arm in the Unified Robot Description Format.
 ///
 /// # Errors
-/// None in practice: the text is written to memory.
+/// The text cannot be written. This does not happen in practice, because it is written to memory.
 ///
 /// ```
 /// let text = arm_model::urdf()?;
@@ -57,7 +57,7 @@ fn write_link(out: &mut XmlDocument, link: &Link) -> io::Result<()> {
     out.end()
 }
 
-/// A cylinder of URDF is along z; a rotation turns it.
+/// Writes a cylinder. In URDF its axis is z, so a rotation turns it to the axis of the solid.
 fn write_solid(out: &mut XmlDocument, solid: &Solid) -> io::Result<()> {
     let [x, y, z] = between(solid.from, solid.to, |from, to| to - from);
     let middle = between(solid.from, solid.to, |from, to| (from + to) / 2.0);

@@ -7,13 +7,13 @@ use quick_xml::events::{BytesEnd, BytesStart, BytesText, Event};
 
 use crate::chain::Axes;
 
-/// An XML document as it is written.
+/// An XML document under construction.
 pub(crate) struct XmlDocument {
     writer: Writer<Vec<u8>>,
     open: Vec<&'static str>,
 }
 
-/// Names and values.
+/// Names and values of attributes.
 pub(crate) type Attributes<'a> = &'a [(&'static str, String)];
 
 impl XmlDocument {
@@ -31,7 +31,7 @@ impl XmlDocument {
         self.writer.write_event(Event::Start(element(name, attributes)))
     }
 
-    /// Ends the element that was begun last.
+    /// Ends the innermost open element.
     pub(crate) fn end(&mut self) -> io::Result<()> {
         match self.open.pop() {
             Some(name) => self.writer.write_event(Event::End(BytesEnd::new(name))),
@@ -44,7 +44,7 @@ impl XmlDocument {
         self.writer.write_event(Event::Empty(element(name, attributes)))
     }
 
-    /// The text, with all elements ended.
+    /// Ends all open elements, and returns the text.
     pub(crate) fn finish(mut self) -> io::Result<String> {
         while !self.open.is_empty() {
             self.end()?;
@@ -63,12 +63,12 @@ fn element(name: &'static str, attributes: Attributes) -> BytesStart<'static> {
     element
 }
 
-/// Three numbers, in nanometres or finer and without the sign of -0.
+/// Three numbers, each as [`number`] writes it.
 pub(crate) fn triple(axes: Axes) -> String {
     axes.map(number).join(" ")
 }
 
-/// A number with at most twelve decimals.
+/// A number with at most twelve decimals. -0 is written as 0.
 pub(crate) fn number(value: f64) -> String {
     ((value * 1e12).round() / 1e12 + 0.0).to_string()
 }

@@ -1,4 +1,4 @@
-//! The models, read by other programs' readers: their forward kinematics are those of `kinematics`.
+//! Parsers of other projects read the models. The forward kinematics of the models are those of `kinematics`.
 
 #![allow(clippy::expect_used, clippy::indexing_slicing, clippy::panic, clippy::unwrap_used)] // A panic is a failed test.
 
@@ -68,7 +68,7 @@ fn transformed_poses(angles: [f64; 6]) -> HashMap<&'static str, Pose> {
     poses
 }
 
-/// From millimetres with x to the right and y forward to metres with x forward and y to the left.
+/// Converts from millimetres with x to the right and y forward to metres with x forward and y to the left.
 fn rep_103(point: Vector<f64>) -> Vector<f64> {
     Vector::new(point.y, -point.x, point.z) * 0.001
 }

@@ -1,6 +1,6 @@
-//! Steps of 20 ms of an arm that follows a sine with joint 1, as `python/benches/arms.py` makes them: a point of a stream, and a
-//! read of positions, velocities, loads and blocked joints. `steps 500` makes 500 steps; with `steps 500 alone` the arm gets a
-//! point each second and no read, so what is left is its own time.
+//! Steps of 20 ms of an arm whose joint 1 follows a sine, as in `python/benches/arms.py`. Each step sends a point of a stream and
+//! reads positions, velocities, loads and blocked joints. `steps 500` makes 500 steps. With `steps 500 alone` the arm gets one
+//! point a second and no read, which leaves the time of the simulation itself.
 //!
 //! ```text
 //! valgrind --tool=callgrind target/release/examples/steps 500

@@ -1,4 +1,4 @@
-//! What a person or a test does to an arm while it runs, and its words: `fault 3=missing`, `hand 2 445`, `power-cycle`.
+//! Actions of a person or a test on a running arm, and their text form: `fault 3=missing`, `hand 2 445`, `power-cycle`.
 
 use alloc::vec::Vec;
 use core::fmt::{self, Display, Formatter};
@@ -11,7 +11,7 @@ use crate::faults::{ArmFault, FaultLocation};
 use crate::scene::Scene;
 use crate::servo::Trip;
 
-/// Something that is done to an arm. Times are in microseconds in its words, and positions in counts.
+/// Something that is done to an arm. In the text form, times are in microseconds and positions in counts of the servo.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Action {
@@ -21,33 +21,33 @@ pub enum Action {
     PowerOff,
     /// `power-cycle`: off and on.
     PowerCycle,
-    /// `restart`: of the controller only.
+    /// `restart`: the controller restarts, and the servos keep their power.
     RestartController,
     /// `halt`: the controller hangs.
     HaltController,
     /// `fault 3=missing` or, for two seconds, `fault 3=missing 2000000`.
     Fault(ArmFault, Option<Duration>),
-    /// `clear`, or `clear 3` for one location: takes faults back.
+    /// `clear` removes all faults, `clear 3` those of one location.
     Clear(Option<FaultLocation>),
     /// `hand 2 445`: a hand turns a joint to a position and holds it there.
     Hand(Joint, u16),
-    /// `hold 2`: a hand holds a joint where it is, until it has torque.
+    /// `hold 2`: a hand holds a joint where it is, until the joint has torque.
     Hold(Joint),
     /// `let-go 2`: the hand lets a joint go.
     LetGo(Joint),
     /// `weight 150`: grams in the gripper.
     Weight(u16),
-    /// `drop`: what is between the claws falls, with its weight.
+    /// `drop`: the gripper drops what it holds. The thing between the claws and the weight are gone.
     Drop,
     /// `trip 2` latches an overload of a joint's servo; `trip 2 heat` makes it too hot.
     Trip(Joint, Trip),
-    /// `scene cube red 30 40 0 220; table -60`: what stands on the table ([`Scene`]). `scene off`: nothing, and no table.
+    /// `scene cube red 30 40 0 220; table -60`: what stands on the table ([`Scene`]). `scene off` removes the table, too.
     Scene(Option<Scene>),
-    /// `seed 7`: what the faults of the host line are drawn from.
+    /// `seed 7`: the seed of the random faults of the host line.
     Seed(u64),
 }
 
-/// A text that names no action.
+/// The text is not an action.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "use disconnect, power-off, power-cycle, restart, halt, fault, clear, hand, hold, let-go, weight, \

@@ -12,7 +12,7 @@ pub trait ArmController: Clone + Debug {
     /// A controller that is powered up at `now`, with the settings found in the storage.
     fn power_up(now: Instant, config: Config, stored: Option<&Image>, storage: Storage) -> Self;
 
-    /// Sets how much later than on the wire an answer of a servo may arrive.
+    /// Sets the longest delay of a servo's answer between the wire and the controller, as in the buffer of a USB adapter.
     fn set_answer_delay(&mut self, delay: Duration);
 
     /// Takes bytes from the host, and returns how many. An empty slice states that the host's line is silent.
@@ -24,7 +24,7 @@ pub trait ArmController: Clone + Debug {
     /// The next action. Call it until it returns [`Output::Wait`].
     fn poll(&mut self, now: Instant, host_room: usize) -> Output<'_>;
 
-    /// The latest time at which a delayed poll is unobservable to the host, unless bytes come before.
+    /// The time until which the host does not notice a delayed poll, unless bytes arrive earlier.
     fn host_deadline(&self) -> Instant;
 
     /// Sets the state of the storage, after an [`Output::Save`].
@@ -36,7 +36,7 @@ pub trait ArmController: Clone + Debug {
     /// The baud rate of the host link, in bits per second.
     fn baud(&self) -> u32;
 
-    /// The registers; `None` if their layout is another one.
+    /// The registers; `None` if the controller does not use this project's register file.
     fn registers(&self) -> Option<&RegisterFile> {
         None
     }

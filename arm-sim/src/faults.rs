@@ -33,21 +33,21 @@ pub use obstacle::{Obstacle, UnknownObstacle};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum ArmFault {
-    /// Of this joint's servo.
+    /// A fault of this joint's servo.
     Servo(Joint, ServoFault),
-    /// No fault: this joint meets something.
+    /// An obstacle of this joint. It is not a fault of the arm.
     Obstacle(Joint, Obstacle),
-    /// Of the bus: the controller receives its own bytes.
+    /// A fault of the servo bus: the controller receives its own bytes.
     Echo,
-    /// Of the supply of all servos.
+    /// A fault of the supply of all servos.
     Supply(SupplyFault),
-    /// Of the settings storage.
+    /// A fault of the settings storage.
     Flash(FlashFault),
-    /// Of the host line.
+    /// A fault of the host line.
     Line(LineFault),
-    /// No fault: a stand supports the arm, so that it does not fall.
+    /// A stand supports the arm, so that it does not fall. It is not a fault of the arm.
     Supported,
-    /// Of all servos: after their own start, a goal switches torque on.
+    /// In every servo, a goal switches torque on if the torque switch was not written since the servo's start.
     GoalStartsTorque,
 }
 
@@ -69,7 +69,7 @@ pub enum FaultLocation {
     Arm,
 }
 
-/// Why a text names no fault.
+/// Why a text is not a fault.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum UnknownArmFault {
     /// The part before the first `=` is not a possible location.
@@ -84,7 +84,7 @@ pub enum UnknownArmFault {
     /// The part after the joint is not an obstacle.
     #[error(transparent)]
     Obstacle(#[from] UnknownObstacle),
-    /// Something is between the claws, and those are moved by joint 7.
+    /// The fault is a thing between the claws, which only joint 7 moves, but it names another joint.
     #[error("only joint 7 moves the claws: use 7=thing=DEGREES")]
     NoClaw,
     /// The part after `supply=` is not a fault of the supply.
@@ -98,7 +98,7 @@ pub enum UnknownArmFault {
     Line(#[from] UnknownLineFault),
 }
 
-/// A text that names no location of a fault.
+/// The text is not a location of a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("use a joint from 1 to 7, bus, supply, flash, line or arm")]
 pub struct UnknownLocation;
@@ -183,14 +183,14 @@ impl ArmFault {
         }
     }
 
-    /// Is it a fault of the servos, their bus or their supply? [`ArmFault::apply`] ignores the others.
+    /// Does the fault act on the [`Plant`]? [`ArmFault::apply`] ignores those that do not.
     #[must_use]
     pub const fn is_of_plant(self) -> bool {
         !matches!(self, Self::Flash(_) | Self::Line(_))
     }
 
-    /// Does it take the place of another one? A servo and the supply have one fault at a time, and a joint has one obstacle
-    /// of each kind.
+    /// Does this new fault replace `other`? A servo and the supply have one fault at a time. A joint has one obstacle of each
+    /// kind, and the host line one fault of each kind.
     #[must_use]
     pub fn replaces(self, other: Self) -> bool {
         match (self, other) {
@@ -203,7 +203,7 @@ impl ArmFault {
         }
     }
 
-    /// What its count counts. `None`: its effects are not counted.
+    /// The unit of its [`FaultCount`]. `None`: its effects are not counted.
     #[must_use]
     pub const fn unit(self) -> Option<&'static str> {
         Some(match self {
@@ -251,20 +251,20 @@ impl ArmFault {
 pub struct FaultReport {
     /// The fault.
     pub fault: ArmFault,
-    /// When it ends, unless it is taken back before.
+    /// When it ends by itself. `None`: it stays until it is removed.
     pub until: Option<Instant>,
-    /// How often it took effect. `None` if that is not counted.
+    /// How often it took effect. `None` if its effects are not counted.
     pub count: Option<FaultCount>,
 }
 
 impl FaultReport {
-    /// The time until it ends by itself.
+    /// The time until it ends by itself. `None`: it stays until it is removed.
     #[must_use]
     pub fn remaining(&self, now: Instant) -> Option<Duration> {
         self.until.map(|until| until - now)
     }
 
-    /// Is it known that it never took effect?
+    /// Did the fault never take effect? `false` if its effects are not counted.
     #[must_use]
     pub fn had_no_effect(&self) -> bool {
         self.count.is_some_and(|count| count.effects == 0)

@@ -17,7 +17,7 @@ pub enum FlashFault {
     Full,
 }
 
-/// A word that names no fault of the flash.
+/// The word is not a fault of the flash.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("use flash=fails or flash=full")]
 pub struct UnknownFlashFault;
@@ -76,7 +76,7 @@ impl<F> FaultyFlash<F> {
         Self { flash, fails: false, count: FaultCount { effects: 0, occasions: 0 } }
     }
 
-    /// Sets whether it refuses writes and erases. Their count begins at 0.
+    /// Sets whether it refuses writes and erases, and resets the count of refused ones.
     pub(crate) fn set_fails(&mut self, fails: bool) {
         self.fails = fails;
         self.count = FaultCount::default();

@@ -1,8 +1,8 @@
 //! The chip's two journal sectors as a simulated NOR flash.
 //!
-//! It behaves like the real one where that matters to the journal: programming only clears bits, erasing sets a whole
-//! sector, and a restart changes nothing. The bytes are in memory, or in other [`Cells`]. The content does not matter
-//! here.
+//! It behaves like the real flash where that matters to the journal: programming only clears bits, erasing sets all bits of a
+//! sector, and a restart changes nothing. The bytes are in memory, or in other [`Cells`]. This module does not interpret
+//! them.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -39,12 +39,12 @@ pub trait Cells: Debug {
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Memory {
-    /// The cells behind the last one here are erased.
+    /// All cells beyond the end of this vector are erased.
     bytes: Vec<u8>,
 }
 
 impl Memory {
-    /// Cells with this content. Those behind its end are erased.
+    /// Cells with this content. The cells beyond its end are erased.
     #[must_use]
     pub fn holding(bytes: Vec<u8>) -> Self {
         let mut memory = Self { bytes };

@@ -17,7 +17,7 @@ use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use crate::fault_count::FaultCount;
 use crate::pace::{CAPACITY, Pacer};
 
-/// A share of 1, in millionths.
+/// A share of 100 %, in millionths.
 const MILLION: u32 = 1_000_000;
 /// The longest delay of a byte, in milliseconds.
 const LONGEST_DELAY_MS: u64 = 10_000;
@@ -28,13 +28,13 @@ const LONGEST_DELAY_MS: u64 = 10_000;
 pub enum LineFault {
     /// This share of the bytes is lost, in millionths.
     Loss(u32),
-    /// In this share of the bytes one bit is wrong, in millionths.
+    /// One bit is wrong in this share of the bytes, in millionths.
     Corruption(u32),
     /// Each byte arrives this much later.
     Delay(Duration),
 }
 
-/// A word that names no fault of the host line.
+/// The word is not a fault of the host line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "use line=loss=PERCENT or line=corruption=PERCENT, as line=loss=0.5%, or line=delay=MILLISECONDS with 1 to 10000"
@@ -106,7 +106,7 @@ impl RandomFault {
         self.count = FaultCount::default();
     }
 
-    /// A random number if the fault hits the next byte.
+    /// Decides whether the fault hits the next byte. Returns a random number if so.
     fn hits(&mut self) -> Option<u64> {
         if self.millionths == 0 {
             return None;
@@ -127,9 +127,9 @@ pub(crate) struct LineDirection {
     corruption: RandomFault,
     delay: Duration,
     delay_count: FaultCount,
-    /// Each byte is an event.
+    /// Each byte has its own deadline.
     is_bytewise: bool,
-    /// Bytes that the pacer gets at these times.
+    /// Delayed bytes, and the times at which they enter the pacer.
     delayed: VecDeque<(Instant, u8)>,
 }
 
@@ -161,7 +161,7 @@ impl LineDirection {
         }
     }
 
-    /// Makes each byte an event.
+    /// Gives each byte its own deadline, as [`Pacer::set_bytewise`] does.
     pub(crate) const fn set_bytewise(&mut self) {
         self.is_bytewise = true;
         self.pacer.set_bytewise();
@@ -246,7 +246,7 @@ impl LineDirection {
             || !self.delayed.is_empty()
     }
 
-    /// Moves the bytes on up to `now`. The line is mostly idle.
+    /// Moves the bytes on up to `now`. Inlined, because the line is mostly idle.
     #[inline]
     pub(crate) fn advance(&mut self, now: Instant) {
         if self.is_in_transit() {
@@ -272,7 +272,7 @@ impl LineDirection {
         self.pacer.take(count);
     }
 
-    /// When the next bytes have arrived, or end their delay; `None` if none are on the way.
+    /// When the next bytes arrive or end their delay; `None` if none are on the way.
     pub(crate) fn deadline(&self) -> Option<Instant> {
         let arrival = self.pacer.deadline();
         let Some(&(due, _)) = self.delayed.front() else { return arrival };

@@ -4,8 +4,8 @@
 //!   push ──▶ [ in transit: on the line ][ arrived: can be taken ] ──▶ take
 //! ```
 //!
-//! The line loses no bytes: it accepts as many as it has room for, and arrived bytes stay until they are taken. The
-//! content of the bytes does not matter here.
+//! The line loses no bytes: it accepts as many as it has room for, and arrived bytes stay until they are taken. This module
+//! does not interpret them.
 
 use alloc::collections::VecDeque;
 
@@ -16,8 +16,8 @@ use protocol_core::wire::MAX_LENGTH;
 pub const CAPACITY: usize = 2 * MAX_LENGTH;
 /// Start bit, eight data bits, stop bit.
 const BITS_PER_BYTE: u64 = 10;
-/// The deadline covers the bytes of this many microseconds: a wake-up for each byte costs more than the byte, and serial
-/// adapters are no finer.
+/// The deadline is the end of the bytes that arrive within this many microseconds. A wake-up for each byte would cost more
+/// time than the byte, and serial adapters do not deliver single bytes either.
 const BATCH_MICROS: u64 = 1_000;
 
 /// One direction of a serial line.
@@ -29,11 +29,11 @@ pub struct Pacer {
     queue: VecDeque<u8>,
     /// Number of bytes at the front of the queue that have arrived.
     arrived: usize,
-    /// The line has been busy without a pause since then.
+    /// The line has been busy without a pause since this time.
     busy_since: Instant,
-    /// Number of bytes that have arrived since then.
+    /// Number of bytes that have arrived since `busy_since`.
     sent: u64,
-    /// The deadline covers the bytes of this many microseconds.
+    /// The deadline is the end of the bytes that arrive within this many microseconds. 0: of the next byte.
     batch_micros: u64,
 }
 
@@ -51,7 +51,7 @@ impl Pacer {
         }
     }
 
-    /// Makes each byte a deadline. Then the times at which bytes are taken do not depend on the bytes behind them.
+    /// Gives each byte its own deadline. Then the times at which bytes are taken do not depend on the bytes behind them.
     pub const fn set_bytewise(&mut self) {
         self.batch_micros = 0;
     }
@@ -77,7 +77,8 @@ impl Pacer {
     /// Starts to send bytes at `now`. Returns how many were accepted.
     pub fn push(&mut self, now: Instant, bytes: &[u8]) -> usize {
         self.advance(now);
-        // A byte that starts when the last one ends does not wait for the next microsecond.
+        // A byte that starts when the last one ends continues the busy period, so that the rounding to microseconds does not
+        // accumulate.
         if self.in_transit() == 0 && self.end_of(self.sent) != Some(now) {
             self.busy_since = now;
             self.sent = 0;
@@ -90,7 +91,7 @@ impl Pacer {
 
     /// Marks the bytes that have arrived by `now`.
     pub fn advance(&mut self, now: Instant) {
-        // This is called at each event of the arm, and the host line is mostly idle.
+        // Each event of the arm calls this, and the host line is mostly idle.
         if self.in_transit() == 0 {
             return;
         }
@@ -122,7 +123,7 @@ impl Pacer {
         }
     }
 
-    /// When the next batch has arrived; `None` if no byte is in transit.
+    /// When the next batch of bytes has arrived; `None` if no byte is in transit.
     #[must_use]
     pub fn deadline(&self) -> Option<Instant> {
         let in_transit = self.in_transit() as u64;
@@ -131,7 +132,7 @@ impl Pacer {
         self.end_of(self.sent + batch)
     }
 
-    /// When this many bytes have arrived since the line is busy. `None` if they arrive at once.
+    /// When this many bytes have arrived, counted from `busy_since`. `None` if they arrive at once.
     fn end_of(&self, count: u64) -> Option<Instant> {
         let micros = count.saturating_mul(BITS_PER_BYTE * 1_000_000).div_ceil(self.baud?);
         Some(self.busy_since + Duration::from_micros(micros))

@@ -58,7 +58,7 @@ pub struct ServoParameters {
     pub damped_drag: i64,
     /// The inertia of rotor and gear, as the joint has to turn it.
     pub rotor_inertia: i64,
-    /// The duty grows by the change of the error in this many milliseconds.
+    /// The derivative time of the position control, in milliseconds: the duty grows by the change of the error in this time.
     pub derivative_ms: i64,
     /// Counts in half a turn.
     pub half_turn: i64,
@@ -99,7 +99,7 @@ impl ServoParameters {
         if joint.number() < 5 { &LARGE } else { &SMALL }
     }
 
-    /// With a share of the stall torque, and of all friction and drag of the gear, in percent.
+    /// The same servo with its stall torque, and with all friction and drag, scaled to these percentages.
     #[must_use]
     pub const fn scaled(self, torque_percent: u16, friction_percent: u16) -> Self {
         let torque = self.stall_torque * torque_percent as i64 / 100;
@@ -121,14 +121,14 @@ pub const NO_LOAD_SPEED: i64 = 372_000;
 pub const FULL_DUTY_ERROR: i64 = 4_300;
 /// The time constant of the filter of the change of the error, in milliseconds.
 pub(crate) const DERIVATIVE_FILTER_MS: i64 = 4;
-/// A joint that turns more slowly than this has static friction.
+/// Static friction acts on a joint that turns more slowly than this.
 pub(crate) const CREEP_COUNTS_PER_SECOND: i64 = 5;
 /// The share of the torque from outside that the gear loses to friction, in percent.
 pub(crate) const LOAD_FRICTION_PERCENT: i64 = 5;
 
 /// A torque above this share of the stall torque is an overload, in 0.1 %.
 pub(crate) const OVERLOAD: u16 = 800;
-/// After an overload of this many milliseconds a servo latches it.
+/// A servo latches an overload that lasts this many milliseconds.
 pub(crate) const OVERLOAD_MS: u32 = 1_000;
 /// A servo restarts below this supply voltage, in 0.1 V.
 pub(crate) const BROWN_OUT_DECIVOLTS: u8 = 45;
@@ -139,7 +139,7 @@ pub(crate) const STALL_RISE_MILLIDEGREES: u64 = 200_000;
 /// The time constant of the temperature.
 pub(crate) const THERMAL_TIME: Duration = Duration::from_millis(300_000);
 
-/// From the axis of the base to the shoulder, in millimetres (the maker's length d).
+/// From the axis of the base to the shoulder, in millimetres (the maker's length d, 29.35 mm, rounded).
 pub(crate) const SHOULDER_FORWARD_MM: i64 = 29;
 /// Shoulder to elbow, in millimetres (the maker's length a).
 pub(crate) const REAR_ARM_MM: i64 = 120;
@@ -147,17 +147,17 @@ pub(crate) const REAR_ARM_MM: i64 = 120;
 pub(crate) const ELBOW_OFFSET_MM: i64 = 25;
 /// Elbow to joint 5, in hundredths of a millimetre (the maker's length c).
 pub(crate) const FOREARM_CENTI_MM: i64 = 19_850;
-/// The rear arm, in grams.
+/// Mass of the rear arm, in grams.
 pub const REAR_ARM_G: i64 = 120;
-/// Its centre of mass, from the shoulder, in millimetres.
+/// Distance of the rear arm's centre of mass from the shoulder, in millimetres.
 pub const REAR_ARM_CENTRE_MM: i64 = 60;
-/// The forearm with the servos of joints 4 and 5, in grams.
+/// Mass of the forearm with the servos of joints 4 and 5, in grams.
 pub const FOREARM_G: i64 = 200;
-/// Its centre of mass, from the elbow, in millimetres.
+/// Distance of the forearm's centre of mass from the elbow, in millimetres.
 pub const FOREARM_CENTRE_MM: i64 = 110;
-/// The tool: the servos of joints 6 and 7, and the claw or the cup, in grams.
+/// Mass of the tool (the servos of joints 6 and 7, and the claw or the cup), in grams.
 pub const TOOL_G: i64 = 100;
-/// Its centre of mass, from the axis of joint 5, in millimetres.
+/// Distance of the tool's centre of mass from the axis of joint 5, in millimetres.
 pub const TOOL_CENTRE_MM: i64 = 50;
-/// The grip, from the axis of joint 5, in millimetres.
+/// Distance of the grip from the axis of joint 5, in millimetres.
 pub(crate) const GRIP_MM: i64 = 90;

@@ -6,9 +6,9 @@
 //!   plant.poll(now) ◀── Wire ◀────────────────┘
 //! ```
 //!
-//! A loaded joint falls without torque and droops with torque, by its load. After power-up a hand holds each joint until it
-//! has torque. The same calls at the same times give the same bytes on every machine. The plant does not know the
-//! controller.
+//! A loaded joint falls without torque, and droops in proportion to its load with torque. After power-up a hand holds each
+//! joint until it has torque. The same calls at the same times give the same bytes on every machine. The plant does not know
+//! the controller.
 
 mod disturbance;
 mod inertia;
@@ -46,7 +46,7 @@ pub use supply::{SupplyFault, UnknownSupplyFault};
 pub use weight::HEAVIEST_LOAD_G;
 use wire::Wire;
 
-/// The baud rate of servos as delivered, in bits per second.
+/// The baud rate in the factory settings of the servos, in bits per second.
 const DELIVERED_BAUD: u32 = 1_000_000;
 
 /// Seven servos on one wire.
@@ -56,26 +56,28 @@ pub struct Plant {
     config: ServoConfig,
     servos: [Servo; JOINTS],
     scales: [AngleScale; JOINTS],
-    /// The pose for which the servos are loaded with the arm's weight, and the weight in the gripper in grams.
+    /// The pose for which the servos are loaded with the arm's weight.
     pose: JointSines,
+    /// The weight in the gripper for which they are loaded, in grams. `None`: they are not loaded yet.
     weighed_g: Option<u16>,
     decoder: Decoder,
     wire: Wire,
     supply: Supply,
     /// The weight that was put into the gripper, in grams.
     load_g: u16,
-    /// The weight of what it carries of the room, in grams.
+    /// The weight of the object of the room that the arm carries, in grams.
     carried_g: u16,
-    /// The claws have touched what is between them.
+    /// The claws have touched the thing between them.
     is_thing_gripped: bool,
-    /// The angle at which the claws touch what is between them, in thousandths of a degree, if that is of the room.
+    /// The angle at which the claws touch an object of the room that is between them, in thousandths of a degree. `None`: nothing
+    /// is between them, or a thing that a person put there.
     room_stop: Option<i32>,
     /// What stands on the table.
     world: Option<Box<World>>,
     /// The pump sucks.
     is_sucking: bool,
     has_echo: bool,
-    /// Of the echo, in bytes.
+    /// Number of echoed bytes.
     echo_count: FaultCount,
     /// The times of the controller's bytes are exact, so that collisions can be simulated.
     has_exact_times: bool,
@@ -84,7 +86,7 @@ pub struct Plant {
     /// The motors are simulated up to this time.
     now: Instant,
     rests: [Rest; JOINTS],
-    /// Until then all servos rest and the supply does not change, unless a call changes them.
+    /// Until this time all servos rest and the supply does not change, unless a call changes them.
     rest_until: Instant,
 }
 
@@ -95,7 +97,7 @@ impl Plant {
         Self::with_config(now, ServoConfig::default())
     }
 
-    /// As [`Self::new`], with servos of this configuration.
+    /// Like [`Self::new`], with servos of this configuration.
     #[must_use]
     pub fn with_config(now: Instant, config: ServoConfig) -> Self {
         let ready_at = now + config.boot_time;
@@ -127,7 +129,7 @@ impl Plant {
         plant
     }
 
-    /// Sets the baud rate of the wire, in bits per second. It is 1 Mbaud at first. Bytes on the wire are lost.
+    /// Sets the baud rate of the wire, in bits per second. Initially it is 1 Mbaud. Bytes on the wire are lost.
     pub fn set_baud(&mut self, baud: u32) {
         self.wire = Wire::at_baud(baud);
     }
@@ -215,7 +217,7 @@ impl Plant {
         }
     }
 
-    /// The servos, for a change.
+    /// The servos, to change them. Ends their rest first.
     fn servos_mut(&mut self) -> &mut [Servo; JOINTS] {
         self.wake();
         &mut self.servos
@@ -291,14 +293,14 @@ impl Plant {
         self.servo(joint).map_or(0, Servo::motor_torque)
     }
 
-    /// How far its present load from outside turns a driven joint off its set-point at most, in thousandths of a degree.
-    /// `None`: the load exceeds its stall torque.
+    /// The greatest distance from its set-point that a driven joint can have under its present external load, in thousandths of a
+    /// degree. `None`: the load exceeds the stall torque.
     #[must_use]
     pub fn droop(&self, joint: Joint) -> Option<i32> {
         self.servo(joint)?.droop().and_then(|droop| i32::try_from(droop).ok())
     }
 
-    /// The distance in which its stall torque stops a joint at its present speed, in thousandths of a degree.
+    /// The distance in which its stall torque would stop a joint from its present speed, in thousandths of a degree.
     #[must_use]
     pub fn stopping_distance(&self, joint: Joint) -> i32 {
         self.servo(joint).map_or(0, |servo| i32::try_from(servo.stopping_distance()).unwrap_or(i32::MAX))
@@ -316,8 +318,7 @@ impl Plant {
         self.servo(joint).is_some_and(Servo::is_held)
     }
 
-    /// Does a joint's servo drive it? Not without torque or power, and not while an alarm switches its
-    /// motor off.
+    /// Does a joint's servo drive the joint? `false` without torque or power, and while an alarm switches the motor off.
     #[must_use]
     pub fn has_torque(&self, joint: Joint) -> bool {
         self.servo(joint).is_some_and(Servo::has_torque)

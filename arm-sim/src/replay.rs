@@ -1,4 +1,4 @@
-//! Does to a new arm what was done to the recorded one, and compares what it sends.
+//! Replays a session: repeats the recorded inputs on a new arm, and compares the bytes that the arm sends.
 
 use alloc::boxed::Box;
 use alloc::vec::Vec;
@@ -15,14 +15,14 @@ use crate::session::{ControllerKind, Entry, HeaderError, Hex, NoEntry, SessionEv
 use crate::simulated_arm::{ArmConfig, SimulatedArm};
 use crate::stock_controller::StockController;
 
-/// The arm sent something else than in the session.
+/// The arm sent other bytes than in the session.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Difference {
     /// When the host took the bytes.
     pub now: Instant,
     /// The bytes of the session.
     pub recorded: Vec<u8>,
-    /// The bytes of this arm, at most as many.
+    /// The bytes of the replaying arm, at most as many as were recorded.
     pub replayed: Vec<u8>,
 }
 
@@ -37,10 +37,10 @@ impl Display for Difference {
     }
 }
 
-/// Why a session cannot be replayed, or how it ended.
+/// Why a session cannot be replayed, or where the replay differs.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ReplayError {
-    /// The first two lines do not begin a session.
+    /// The first two lines are not the header of a session.
     #[error(transparent)]
     Header(#[from] HeaderError),
     /// A line is not an entry.
@@ -48,7 +48,7 @@ pub enum ReplayError {
     Line {
         /// Its number; the first is 1.
         line: usize,
-        /// What it should be.
+        /// The forms that an entry can have.
         reason: NoEntry,
     },
     /// A line goes back in time.
@@ -57,7 +57,7 @@ pub enum ReplayError {
         /// Its number; the first is 1.
         line: usize,
     },
-    /// The arm sent something else.
+    /// The arm sent other bytes.
     #[error("line {line}: {difference}")]
     Different {
         /// The number of the line that differs; the first is 1.
@@ -67,7 +67,7 @@ pub enum ReplayError {
     },
 }
 
-/// An arm of either controller.
+/// An arm with either controller.
 trait ReplayedArm {
     fn now(&self) -> Instant;
     fn apply(&mut self, entry: &Entry) -> Result<(), Difference>;
@@ -130,7 +130,7 @@ impl Replay {
     /// Replays a whole session. Returns the number of its lines.
     ///
     /// # Errors
-    /// The text is no session, or the arm sends something else.
+    /// The text is not a session, or the arm sends other bytes.
     pub fn run(text: &str) -> Result<usize, ReplayError> {
         let mut lines = text.lines();
         let mut head = || lines.next().unwrap_or_default();
@@ -142,7 +142,7 @@ impl Replay {
     /// Replays the next line after the first two.
     ///
     /// # Errors
-    /// It is no entry, or the arm has sent something else.
+    /// The line is not an entry or is earlier than the one before, or the arm has sent other bytes.
     pub fn line(&mut self, text: &str) -> Result<(), ReplayError> {
         self.line += 1;
         let line = self.line;

@@ -22,23 +22,23 @@ use crate::thousandths::Thousandths;
 
 /// A scene has at most this many walls, cubes and cylinders.
 pub const MOST_OBJECTS: usize = 24;
-/// A name has at most this many letters.
+/// A name has at most this many characters.
 const LONGEST_NAME: usize = 16;
 /// A place is at most this far from the base, in mm.
 const FARTHEST: f64 = 1_000.0;
-/// Lengths in mm.
+/// The least and the greatest length, in mm.
 const SIZES: [f64; 2] = [5.0, 1_000.0];
-/// Weights in grams.
+/// The least and the greatest weight, in grams.
 const WEIGHTS: [f64; 2] = [1.0, 1_000.0];
 
-/// What the arm ends in.
+/// The tool at the end of the arm.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Tool {
     /// Two fingers, moved by joint 7.
     #[default]
     Claws,
-    /// A suction cup, for the pump.
+    /// A suction cup, which the vacuum pump evacuates.
     Cup,
 }
 
@@ -46,14 +46,14 @@ pub enum Tool {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Form {
-    /// With equal edges.
+    /// A cube.
     Cube {
         /// The edge.
         edge: f64,
     },
-    /// Standing.
+    /// A cylinder that stands upright.
     Cylinder {
-        /// Across.
+        /// The diameter.
         diameter: f64,
         /// From its foot to its top.
         height: f64,
@@ -70,9 +70,9 @@ pub struct Item {
     pub form: Form,
     /// Its weight in grams.
     pub grams: u16,
-    /// Where its middle is at first, seen from above: x and y in mm.
+    /// The initial position of its middle, seen from above: x and y in mm.
     pub at: [f64; 2],
-    /// How far it is turned to the left at first, in degrees.
+    /// Its initial rotation about the vertical in degrees, anticlockwise seen from above.
     pub turn: f64,
 }
 
@@ -82,13 +82,13 @@ pub struct Item {
 pub struct Block {
     /// Its name.
     pub name: String,
-    /// Where its middle is, seen from above: x and y in mm.
+    /// The position of its middle, seen from above: x and y in mm.
     pub at: [f64; 2],
     /// Width along x, depth along y, and height, in mm.
     pub size: [f64; 3],
 }
 
-/// What stands on the table, at first.
+/// The table and the initial positions of the things on it.
 ///
 /// ```
 /// use arm_sim::scene::Scene;
@@ -103,11 +103,11 @@ pub struct Block {
 pub struct Scene {
     /// The height of the table: z in mm.
     pub table: f64,
-    /// What the arm ends in.
+    /// The tool at the end of the arm.
     pub tool: Tool,
-    /// The walls.
+    /// The walls. They never move.
     pub walls: Vec<Block>,
-    /// What can be moved.
+    /// The cubes and cylinders, which can be moved.
     pub items: Vec<Item>,
 }
 
@@ -118,7 +118,7 @@ impl Default for Scene {
     }
 }
 
-/// Why a text is no scene.
+/// Why a text is not a scene.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("line {line} of the scene: {reason}")]
 pub struct SceneError {
@@ -192,7 +192,7 @@ impl Scene {
         Ok(())
     }
 
-    /// A name, if nothing has it yet.
+    /// Checks a new name: letters, digits and `-`, and not in use yet.
     fn name(&self, name: &str) -> Result<String, &'static str> {
         let mut names =
             self.walls.iter().map(|wall| &wall.name).chain(self.items.iter().map(|item| &item.name));
@@ -207,7 +207,7 @@ fn number(word: &str) -> Result<f64, &'static str> {
     Thousandths::parse(word).map(|Thousandths(value)| f64::from(value) / 1_000.0).ok_or(NUMBER)
 }
 
-/// A number of a scene in words.
+/// A number of a scene in its text form.
 #[expect(
     clippy::cast_possible_truncation,
     reason = "numbers of a scene are small, and a part below a thousandth is none"

@@ -6,7 +6,7 @@
 //!                   └──── position, speed, load ──────────┘
 //! ```
 //!
-//! Time passes in steps of a millisecond. The servo does not know the timing of the wire or other servos. The values
+//! Time passes in steps of a millisecond. The servo knows neither the timing of the wire nor other servos. The parameters
 //! of its motor, gear and temperature are in `parameters.rs`.
 
 mod config;
@@ -42,7 +42,7 @@ use temperature::Temperature;
 /// An answer of a servo.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ServoAnswer {
-    /// The answer is sent this much later than [`ServoConfig::return_delay`] requires.
+    /// The answer is sent this much later than after [`ServoConfig::return_delay`].
     pub delay: Duration,
     /// The frame.
     pub bytes: ServoFrameBuffer,
@@ -56,13 +56,13 @@ pub struct Servo {
     registers: ServoRegisters,
     motor: Motor,
     fault: FaultState,
-    /// It executes no frame before this time. [`Instant::FAR_FUTURE`] without supply.
+    /// The servo executes no frame before this time. [`Instant::FAR_FUTURE`] without supply.
     ready_at: Instant,
     /// The torque switch is on.
     is_on: bool,
-    /// A hand holds it until it has torque.
+    /// A hand holds the joint until it has torque.
     is_held: bool,
-    /// A stand holds it whenever it has no torque.
+    /// A stand holds the joint whenever it has no torque.
     is_supported: bool,
     protection: Protection,
     temperature: Temperature,
@@ -72,9 +72,9 @@ pub struct Servo {
     thing_count: FaultCount,
     /// Milliseconds in which the joint was pushed.
     push_count: FaultCount,
-    /// What the registers hold, apart from the measurements of the motor.
+    /// The values in the registers apart from the measurements of the motor. `None`: not written since the start.
     reported: Option<Reported>,
-    /// The registers hold the measurements of an earlier step: they are brought up to date when a frame comes.
+    /// The registers hold the measurements of an earlier step. They are updated when a frame comes.
     is_reading_old: bool,
 }
 
@@ -88,7 +88,7 @@ struct Reported {
 }
 
 impl Servo {
-    /// The servo of a joint, with the joint's id. It is held by a hand and starts until `ready_at`.
+    /// The servo of a joint, with the joint's id. A hand holds it. It executes frames from `ready_at` on.
     #[must_use]
     pub fn new(joint: Joint, config: ServoConfig, position_counts: u16, ready_at: Instant) -> Self {
         Self {
@@ -132,13 +132,13 @@ impl Servo {
         self.registers.id()
     }
 
-    /// The baud rate in bits per second. The caller passes no frames of another rate.
+    /// The baud rate in bits per second. The caller must not pass frames that were sent at another rate.
     #[must_use]
     pub fn baud(&self) -> u32 {
         self.registers.baud()
     }
 
-    /// Sets or removes a fault at `now`. `ready_at` is used if this removes or restores the power.
+    /// Sets or removes a fault at `now`. If this restores the power, the servo executes frames from `ready_at` on.
     pub fn set_fault(&mut self, now: Instant, fault: Option<ServoFault>, ready_at: Instant) {
         let was_missing = self.fault.is_missing();
         self.fault.set(now, fault);
@@ -158,7 +158,7 @@ impl Servo {
         self.config = config;
     }
 
-    /// Gives it another gear and another strength.
+    /// Changes the stall torque, the friction and the drag. See [`Motor::set_parameters`].
     pub(crate) fn set_parameters(&mut self, parameters: &ServoParameters) {
         self.motor.set_parameters(parameters);
     }
@@ -183,7 +183,8 @@ impl Servo {
         answer.map(|mut bytes| ServoAnswer { delay: self.fault.inject(&mut bytes), bytes })
     }
 
-    /// Does a frame leave the next steps as they are? It is a question, or a servo with torque holds all values already.
+    /// Does a frame have no effect on the next steps? True for a question, and for values that a servo with torque already
+    /// holds.
     pub(crate) fn is_unchanged_by(&self, frame: &ServoFrame<'_>) -> bool {
         let holds_values = || self.registers.holds(frame) && self.motor.is_started(self.registers.goal());
         self.is_on == self.is_switched_on()
@@ -243,7 +244,7 @@ impl Servo {
         now >= self.ready_at && !self.fault.is_missing()
     }
 
-    /// The current in 0.1 % of that of a blocked motor: the torque in either direction, as the supply has to give it.
+    /// The current in 0.1 % of that of a stalled motor. It is proportional to the magnitude of the torque.
     #[must_use]
     pub fn current(&self) -> u16 {
         self.motor.torque().unsigned_abs().min(1_000)
@@ -260,17 +261,17 @@ impl Servo {
         self.motor.load()
     }
 
-    /// How far its load turns it off its set-point at most, in thousandths of a degree.
+    /// See [`Motor::droop`].
     pub(crate) fn droop(&self) -> Option<i64> {
         self.motor.droop()
     }
 
-    /// The distance in which its stall torque stops it, in thousandths of a degree.
+    /// See [`Motor::stopping_distance`].
     pub(crate) fn stopping_distance(&self) -> i64 {
         self.motor.stopping_distance()
     }
 
-    /// The goal that it holds, in counts.
+    /// The goal in its registers, in counts, within the limits of its EEPROM.
     #[must_use]
     pub fn goal_counts(&self) -> u16 {
         self.registers.goal().position_counts
@@ -282,7 +283,7 @@ impl Servo {
         self.motor.position_counts()
     }
 
-    /// Does it drive its joint?
+    /// Does the servo drive its joint? `false` without torque or power, and while an alarm switches the motor off.
     #[must_use]
     pub const fn has_torque(&self) -> bool {
         self.is_on && !self.protection.is_unloaded()
@@ -293,14 +294,14 @@ impl Servo {
         self.motor.position()
     }
 
-    /// Turns it by hand, and holds it there. A servo with torque turns back.
+    /// Turns the joint by hand to a position in counts, and holds it there. A servo with torque turns back.
     pub fn move_by_hand(&mut self, counts: u16) {
         self.update_reading();
         self.motor.turn_to(counts);
         self.hold_by_hand(true);
     }
 
-    /// Sets whether a hand holds it until it has torque.
+    /// Sets whether a hand holds the joint until it has torque. A joint with torque cannot be held.
     pub const fn hold_by_hand(&mut self, is_held: bool) {
         self.is_held = is_held && !self.is_on;
     }
@@ -310,7 +311,7 @@ impl Servo {
         self.is_held
     }
 
-    /// Sets whether a stand holds it whenever it has no torque.
+    /// Sets whether a stand holds the joint whenever it has no torque.
     pub const fn support(&mut self, is_supported: bool) {
         self.is_supported = is_supported;
     }

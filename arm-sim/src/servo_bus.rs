@@ -6,13 +6,13 @@ use crate::plant::Plant;
 
 /// A servo bus from the side of the controller.
 pub trait ServoBus {
-    /// Do the servos run in real time? Then a caller that is late cannot catch up.
+    /// Do the servos run in real time? Then a late caller cannot catch up.
     const IS_REAL: bool;
 
     /// The baud rate, in bits per second.
     fn baud(&self) -> u32;
 
-    /// An answer may arrive this much later than on the wire.
+    /// The longest delay of an answer between the wire and the controller; zero for simulated servos.
     fn answer_delay(&self) -> Duration;
 
     /// Takes bytes that the controller starts to send at `now`.
@@ -21,7 +21,7 @@ pub trait ServoBus {
     /// Returns the bytes that the controller has received by `now`.
     fn poll(&mut self, now: Instant) -> &[u8];
 
-    /// When the next bytes arrive. `None` if there are none, or if the time is unknown.
+    /// When the next bytes arrive. `None` if no bytes are on the way, or if the time is unknown.
     fn deadline(&self) -> Option<Instant>;
 
     /// Switches the power of the servos off and on, if that is possible.

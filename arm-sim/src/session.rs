@@ -12,8 +12,8 @@
 //! ```
 //!
 //! Times are microseconds since power-up. Every call that lets time pass is recorded, because an idle host line has a
-//! meaning ([D4](protocol_core::decisions#d4)). A [`Replay`](crate::replay::Replay) does the same to a new arm and
-//! compares what it sends. Where the arm starts to differ, it says what differs.
+//! meaning ([D4](protocol_core::decisions#d4)). A [`Replay`](crate::replay::Replay) repeats the same inputs on a new arm and
+//! compares the bytes that it sends. It reports the first difference.
 
 use alloc::vec::Vec;
 use core::fmt::{self, Debug, Display, Formatter};
@@ -30,22 +30,22 @@ pub use header::{ControllerKind, HeaderError, SessionHeader};
 /// The version of the format.
 pub const VERSION: u32 = 1;
 
-/// Gets what happens to an arm.
+/// Receives the entries of a session while it is recorded.
 pub trait SessionRecorder: Debug + Send {
-    /// Something happened.
+    /// Adds an entry. Entries come in the order of their times.
     fn add(&mut self, entry: &Entry);
 }
 
-/// What happened.
+/// What an entry records.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SessionEvent {
     /// The host started to send these bytes.
     Sent(Vec<u8>),
-    /// Time passed. Was the host known to be idle?
+    /// Time passed. `true`: the host was known to be idle.
     Advanced(bool),
     /// The host took these bytes off the line.
     Taken(Vec<u8>),
-    /// Something else was done to the arm.
+    /// An action was carried out on the arm.
     Acted(Action),
 }
 
@@ -58,7 +58,7 @@ pub struct Entry {
     pub event: SessionEvent,
 }
 
-/// A line that is no entry.
+/// The line is not an entry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("use MICROSECONDS and then '> HEX', '< HEX', '~', '=' or '! ACTION'")]
 pub struct NoEntry;

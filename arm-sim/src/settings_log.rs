@@ -1,11 +1,11 @@
-//! The settings storage in the log.
+//! Logs the state of the settings storage.
 
 use embedded_storage::nor_flash::NorFlash;
 use protocol_core::journal::Opened;
 use protocol_core::settings::{Settings, Storage};
 use tracing::{debug, info, warn};
 
-/// Logs the result of a start.
+/// Logs the result of opening the journal at a start.
 pub(crate) fn opened<F: NorFlash>(settings: &Settings<F>) {
     match settings.opened() {
         Opened::Found(_) => debug!("settings found, room for {} more", settings.room()),

@@ -6,8 +6,8 @@
 //!   host_received ◀─ Pacer ◀─ └────────────┘ ──▶ Settings
 //! ```
 //!
-//! The simulation advances from event to event, each at its own time. So the result does not depend on how often
-//! [`SimulatedArm::advance`] is called: a late caller makes neither the arm slower nor its servos late.
+//! The simulation advances from event to event, and processes each event at its own time. So the result does not depend on
+//! how often [`SimulatedArm::advance`] is called: a late call slows down neither the arm nor its servos.
 
 use alloc::boxed::Box;
 
@@ -41,9 +41,9 @@ mod snapshot;
 
 /// How long the controller waits for a servo's answer.
 const SERVO_TIMEOUT: Duration = Duration::from_millis(5);
-/// The pause of the controller before each frame on the servo bus: that of the reference board.
+/// The pause of the controller before each frame on the servo bus, as on the reference board.
 const GUARD_TIME: Duration = Duration::from_micros(100);
-/// What differs from one simulated arm to another.
+/// The configuration of a simulated arm.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ArmConfig {
@@ -217,8 +217,8 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
         self.process(self.now, false);
     }
 
-    /// The last host disconnects: the bytes on the line to it are lost. The arm executes what the host sent before, and
-    /// sends nothing for it. Then its reports end ([M12](protocol_core::decisions#m12)).
+    /// The last host disconnects: the bytes on the line to it are lost. The arm executes what the host sent before, without
+    /// sending answers. Then the reports end ([M12](protocol_core::decisions#m12)).
     pub fn host_disconnect(&mut self) {
         self.record_action(self.now, Action::Disconnect);
         self.to_host.clear(self.paced_baud());
@@ -227,7 +227,7 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
         self.process(self.now, false);
     }
 
-    /// Tells the controller that the host has left, once the last bytes of the host are executed.
+    /// Tells the controller that the host has left, if the last bytes of the host are executed.
     fn end_host(&mut self) {
         if self.leaving == Some(0) && !self.is_halted {
             self.controller.host_left(self.now);
@@ -243,7 +243,8 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
     }
 
     fn simulate(&mut self, now: Instant, host_is_idle: bool) {
-        // Real servos cannot catch up: an answer that has arrived but was not read has not timed out.
+        // With real servos only `now` is processed. At an earlier time, an answer that has arrived but was not read yet would
+        // time out.
         let mut event = self.next_event();
         while !B::IS_REAL && event < now {
             self.process(event, host_is_idle);
@@ -317,13 +318,13 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
         }
     }
 
-    /// Lets the simulated pump suck, or not.
+    /// Sets whether the simulated pump sucks. Has no effect on real servos.
     fn suck(&mut self, is_sucking: bool) {
         self.bus.plant_mut().into_iter().for_each(|plant| plant.set_sucking(is_sucking));
     }
 }
 
-/// A controller that starts.
+/// Starts a controller. `faults` are the initial bits of register 241.
 fn start<F: NorFlash, B: ServoBus, C: ArmController>(
     now: Instant,
     arm: ArmConfig,

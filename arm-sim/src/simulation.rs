@@ -1,4 +1,4 @@
-//! An arm with a clock of its own, for programs that have no real time: tests, learning, a browser.
+//! An arm with a clock of its own, for programs that do not run in real time: tests, learning, a browser.
 //!
 //! ```
 //! use arm_sim::request::Request;
@@ -6,7 +6,7 @@
 //!
 //! let mut arm = Simulation::default();
 //! arm.advance(Duration::from_millis(1_000));
-//! // Joint 1 to 120 degrees, and a second later the time is still virtual.
+//! // Move joint 1 to 120 degrees. The three seconds pass in virtual time.
 //! arm.send_request(&Request::Write { address: 46, values: &[120] });
 //! arm.advance(Duration::from_millis(3_000));
 //! assert_eq!(arm.plant().angle(Joint::ALL[0]) / 1_000, 120);
@@ -50,7 +50,7 @@ use crate::tap::Tap;
 /// The arm's bytes are taken off its line at least this often, so that the line is never full.
 const TAKE_PERIOD: Duration = Duration::from_millis(10);
 
-/// What differs from one simulation to another.
+/// The configuration of a simulation.
 #[derive(Clone, Debug)]
 pub struct SimulationConfig {
     /// The chip id, most significant byte first ([D8](protocol_core::decisions#d8)).
@@ -84,7 +84,7 @@ pub struct Simulation<C = Controller> {
     to_send: VecDeque<u8>,
     /// Bytes that have arrived at the host.
     received: Vec<u8>,
-    /// What is done to the arm later, and when.
+    /// Planned actions, and when to carry them out.
     planned: Vec<(Instant, Action)>,
 }
 
@@ -183,7 +183,7 @@ impl<C: ArmController> Simulation<C> {
         &self.received
     }
 
-    /// Lets time pass until this time, but not past the next thing to do.
+    /// Lets time pass towards `end`: at most for [`TAKE_PERIOD`], and not past the next planned action.
     fn advance_to(&mut self, end: Instant) {
         let planned = self.planned.iter().map(|(time, _)| *time).min().unwrap_or(end);
         self.now = end.min(self.now + TAKE_PERIOD).min(planned.max(self.now));
@@ -233,7 +233,7 @@ impl<C: ArmController> Simulation<C> {
         self.arm.restart_controller(self.now);
     }
 
-    /// Stops the controller, as a program that hangs, until [`Simulation::restart_controller`] or
+    /// Stops the controller, as if its program hung, until [`Simulation::restart_controller`] or
     /// [`Simulation::power_cycle`]. The servos keep their goals.
     pub fn halt_controller(&mut self) {
         self.arm.halt_controller(self.now);
@@ -251,8 +251,7 @@ impl<C: ArmController> Simulation<C> {
         self.arm.power_off(self.now);
     }
 
-    /// Gives the arm a fault, for a time or until [`Simulation::end_faults`]. Returns the report of the fault that it
-    /// replaces.
+    /// Adds a fault, for `duration` or until [`Simulation::end_faults`]. Returns the report of the fault that it replaces.
     ///
     /// ```
     /// use arm_sim::{Duration, Simulation};
@@ -269,7 +268,7 @@ impl<C: ArmController> Simulation<C> {
         self.arm.set_fault(self.now, fault, duration)
     }
 
-    /// Takes the faults at a location back, or all faults. Returns how often they took effect.
+    /// Removes the faults at a location, or all faults with `None`. Returns their reports.
     pub fn end_faults(&mut self, location: Option<FaultLocation>) -> Vec<FaultReport> {
         self.arm.end_faults(self.now, location)
     }
@@ -284,17 +283,17 @@ impl<C: ArmController> Simulation<C> {
         self.arm.take_ended_faults()
     }
 
-    /// Draws the faults of the host line from this seed from now on. By default it is 1.
+    /// Sets the seed of the random faults of the host line, 1 by default. The bytes on the host line are lost.
     pub fn set_seed(&mut self, seed: u64) {
         self.arm.set_seed(seed);
     }
 
-    /// Does something to the arm. Returns the reports of the faults that this ended.
+    /// Carries out an action. Returns the reports of the faults that it ended.
     pub fn act(&mut self, action: Action) -> Vec<FaultReport> {
         self.arm.act(self.now, action)
     }
 
-    /// Does something to the arm after this time, also while a program waits for the arm.
+    /// Plans an action for this time from now. It is carried out while time passes, also in [`Simulation::advance_until`].
     ///
     /// ```
     /// use arm_sim::{Duration, Simulation};
@@ -311,7 +310,7 @@ impl<C: ArmController> Simulation<C> {
         self.planned.push((self.now + after, action));
     }
 
-    /// Passes everything that is done to the arm by [`Simulation::send`] and [`Simulation::act`], and every byte that it
+    /// Passes everything that is done to the arm by [`Simulation::send`] and [`Simulation::act`], and every byte that the arm
     /// sends, to `recorder` from now on: see [`crate::session`]. A copy of the simulation has no recorder.
     pub fn set_recorder(&mut self, recorder: impl SessionRecorder + 'static) {
         self.arm.set_recorder(recorder);

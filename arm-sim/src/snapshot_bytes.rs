@@ -6,8 +6,8 @@
 //!   └───────────┴────────────────────────────┴────────────────────┴─────────────────────┘
 //! ```
 //!
-//! The layout of the state is that of the types, so another version refuses it. The checksum finds accidental damage only:
-//! forged bytes can hold a state in which a step panics or never ends.
+//! The layout of the state follows the types of this version, so other versions refuse it. The checksum finds accidental damage
+//! only: forged bytes can hold a state in which a step panics or never ends.
 
 use alloc::borrow::ToOwned;
 use alloc::string::String;
@@ -24,13 +24,13 @@ const CHECKSUM: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 /// Why bytes are not a simulation.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SnapshotError {
-    /// The bytes begin differently.
+    /// The bytes do not begin with `7BotSim`.
     #[error("these bytes are not a snapshot of a simulation")]
     NotASnapshot,
     /// Bytes are missing, changed or added.
     #[error("the snapshot is damaged")]
     Damaged,
-    /// Another version has other types.
+    /// The bytes were made by another version, which has other types.
     #[error("the snapshot was made by version {made_by}, and this is version {VERSION}: take a new one")]
     OtherVersion {
         /// The version that made the bytes.
@@ -39,7 +39,7 @@ pub enum SnapshotError {
 }
 
 impl Simulation {
-    /// The simulation as bytes. They hold no recorder and no tap, as a copy does not.
+    /// The simulation as bytes. Like a copy, they hold no recorder and no tap.
     ///
     /// ```
     /// use arm_sim::{Duration, Simulation};
@@ -52,14 +52,14 @@ impl Simulation {
     /// ```
     #[must_use]
     pub fn to_bytes(&self) -> Vec<u8> {
-        // A vector has room for everything, and each sequence in the state tells its length, so postcard does not fail.
+        // postcard does not fail: a vector has room for all bytes, and each sequence in the state knows its length.
         sealed(&postcard::to_extend(&(VERSION, self), Vec::new()).unwrap_or_default())
     }
 
-    /// From the bytes of [`Simulation::to_bytes`]. They have to come from a trusted source.
+    /// Decodes the bytes of [`Simulation::to_bytes`]. They have to come from a trusted source.
     ///
     /// # Errors
-    /// The bytes are damaged, or those of another version, or something else.
+    /// The bytes are damaged, were made by another version, or are not a snapshot.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, SnapshotError> {
         let (version, state) = postcard::take_from_bytes::<&str>(content(bytes)?).map_err(damaged)?;
         if version != VERSION {
@@ -81,7 +81,7 @@ fn sealed(content: &[u8]) -> Vec<u8> {
     [MAGIC, content, &CHECKSUM.checksum(content).to_le_bytes()].concat()
 }
 
-/// The content of [`sealed`].
+/// Checks magic and checksum, and returns what is between them: the reverse of [`sealed`].
 fn content(bytes: &[u8]) -> Result<&[u8], SnapshotError> {
     let rest = bytes.strip_prefix(MAGIC).ok_or(SnapshotError::NotASnapshot)?;
     match rest.split_last_chunk() {
@@ -142,7 +142,7 @@ mod tests {
             prop_assert!(Simulation::from_bytes(&sealed(&[head, bytes].concat())).is_err());
         }
 
-        /// With a checksum that fits, so that the state is decoded.
+        /// The checksum fits the changed state, so that the state is decoded.
         #[test]
         fn no_changed_state_panics_while_it_is_loaded(at in any::<prop::sample::Index>(), value in any::<u8>()) {
             let bytes = Simulation::default().to_bytes();

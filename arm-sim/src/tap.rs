@@ -5,9 +5,10 @@ use core::fmt::Debug;
 
 use protocol_core::time::{Duration, Instant};
 
-/// Gets a copy of the bytes on the host line.
+/// Receives a copy of the bytes on the host line.
 pub trait Tap: Debug + Send {
-    /// The line starts, or starts again. `gap` is the idle time by which the arm separates frames (D4).
+    /// The line starts, or starts again. `gap` is the idle time after which the arm looks for frames inside an unfinished one
+    /// (D4).
     fn restart(&mut self, gap: Duration);
     /// The arm received these bytes from the host. No bytes: the host's line is idle at `now`.
     fn received(&mut self, now: Instant, bytes: &[u8]);
@@ -15,7 +16,7 @@ pub trait Tap: Debug + Send {
     fn sent(&mut self, now: Instant, bytes: &[u8]);
 }
 
-/// A place for something that watches an arm. A copy of the arm has none.
+/// An optional observer of an arm. A clone is empty, so a copy of the arm has no observer.
 #[derive(Debug)]
 pub(crate) struct Watcher<T: ?Sized>(Option<Box<T>>);
 

@@ -1,4 +1,4 @@
-//! Numbers in words: with at most three decimals, so that they are whole thousandths.
+//! The text form of numbers with at most three decimals, which are whole thousandths.
 
 use core::fmt::{self, Display, Formatter};
 

@@ -4,8 +4,7 @@
 //!   byte from the wire ──▶ block ──▶ the computer, when the block is full or its latency timer ends
 //! ```
 //!
-//! A USB adapter collects bytes until its latency timer ends or its buffer is full. The same seed gives the same delays.
-//! There are no frames here.
+//! The same seed gives the same delays. There are no frames here.
 
 use alloc::vec::Vec;
 use core::str::FromStr;
@@ -14,7 +13,7 @@ use protocol_core::time::{Duration, Instant};
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
-/// An FTDI chip sends a block at once when it has this many bytes: a packet of 64 without two bytes of status.
+/// An FTDI chip sends a block at once when it has this many bytes: a packet of 64 bytes less two bytes of status.
 const BLOCK: usize = 62;
 /// The longest possible setting, in milliseconds.
 const LONGEST_MS: u64 = 1_000;
@@ -26,7 +25,7 @@ pub struct Latency {
     longest: Duration,
 }
 
-/// A text that is no latency.
+/// The text is not a latency.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("use milliseconds from 0 to {LONGEST_MS}: one number as 16, or two bounds as 1-20")]
 pub struct UnknownLatency;

@@ -1,6 +1,6 @@
-//! A file of the true angles of the joints, for tests of a controller in another process: what it measured may be old.
+//! A file of the true angles of the joints, for tests of a controller in another process, whose own measurements may be old.
 //!
-//! A line each 10 ms has the time in seconds since 1970, and seven angles in degrees.
+//! Each line has the time in seconds since 1970, and seven angles in degrees. There is a line each 10 ms.
 
 use std::fs::File;
 use std::io::{self, Write};
@@ -25,12 +25,12 @@ impl AngleLog {
     /// Creates the file, or empties it.
     ///
     /// # Errors
-    /// It cannot be written.
+    /// The file cannot be created.
     pub fn create(path: &Path) -> io::Result<Self> {
         Ok(Self { file: File::create(path)?, due: Instant::ZERO })
     }
 
-    /// Writes a line if one is due. The plant is simulated up to `now`.
+    /// Writes a line if one is due. The plant must be simulated up to `now`.
     ///
     /// # Errors
     /// The file cannot be written.

@@ -10,12 +10,12 @@ pub struct BusLine {
     answer_delay: Duration,
     to_servos: Vec<u8>,
     from_servos: Vec<u8>,
-    /// What the last poll returned.
+    /// The bytes that the last poll returned.
     polled: Vec<u8>,
 }
 
 impl BusLine {
-    /// A line at `baud` bits per second, with this longest delay between the wire and this computer.
+    /// A line at `baud` bits per second. `answer_delay` is the longest delay of an answer between the wire and this computer.
     #[must_use]
     pub const fn new(baud: u32, answer_delay: Duration) -> Self {
         Self { baud, answer_delay, to_servos: Vec::new(), from_servos: Vec::new(), polled: Vec::new() }
@@ -26,7 +26,7 @@ impl BusLine {
         self.from_servos.extend_from_slice(bytes);
     }
 
-    /// Removes the bytes to the servos.
+    /// Takes the bytes that the controller has sent to the servos.
     pub fn take(&mut self) -> Vec<u8> {
         std::mem::take(&mut self.to_servos)
     }

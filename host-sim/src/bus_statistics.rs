@@ -10,25 +10,25 @@ use protocol_core::time::{Duration, Instant};
 
 /// The resolution of round-trip times.
 const GRAIN_US: u64 = 100;
-/// Longer round-trip times count as this many steps of the resolution: 100 ms.
+/// Number of steps of the resolution. Round-trip times above 100 ms count as 100 ms.
 const GRAINS: usize = 1_000;
 
-/// Counts since a point in time.
+/// Counts of a period, which began at `since`.
 #[derive(Debug)]
 pub struct BusStatistics {
     since: Instant,
     decoder: Decoder,
-    /// The id and the time of the last question, until its answer.
+    /// The servo id and the time of the last question; `None` after its answer.
     asked: Option<(u8, Instant)>,
     questions: u64,
     goals: u64,
-    /// Received bytes, also those outside answers.
+    /// Number of received bytes, including those outside answers.
     bytes: u64,
     answers: u64,
     round_trips: Vec<u32>,
 }
 
-/// Figures of a period.
+/// The figures of a period.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Figures {
     /// Questions per control cycle of 10 ms.
@@ -41,7 +41,7 @@ pub struct Figures {
     pub p99: Duration,
     /// Number of answers.
     pub answers: u64,
-    /// Received bytes, also those outside answers.
+    /// Number of received bytes, including those outside answers.
     pub bytes: u64,
 }
 
@@ -61,7 +61,7 @@ impl BusStatistics {
         }
     }
 
-    /// Counts bytes that are written to the port: whole frames.
+    /// Counts the frames in bytes that are written to the port. The bytes must be whole frames.
     pub fn sent(&mut self, now: Instant, bytes: &[u8]) {
         let mut decoder = Decoder::new();
         for piece in bytes.chunks(Decoder::CAPACITY / 2) {
@@ -127,7 +127,7 @@ impl BusStatistics {
             seen += u64::from(count);
             seen < wanted
         });
-        // The end of the step.
+        // The upper bound of the step.
         Duration::from_micros((grains.count() as u64 + 1) * GRAIN_US)
     }
 }

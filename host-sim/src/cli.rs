@@ -1,4 +1,4 @@
-//! The command line: options, exit statuses, and errors in one line. Scripts rely on all of it.
+//! The command line: options, exit statuses, and errors in one line. Scripts rely on all of these.
 
 use std::path::PathBuf;
 
@@ -19,7 +19,7 @@ const DEFAULT_CHIP_ID: &str = "53494d000001";
 /// The ids of servos: one value of an option.
 pub type Ids = Vec<u8>;
 
-/// `cargo xtask dist` adds the commit.
+/// The version. `cargo xtask dist` adds the commit.
 const VERSION: &str = match option_env!("SEVENBOT_RELEASE") {
     Some(release) => release,
     None => env!("CARGO_PKG_VERSION"),

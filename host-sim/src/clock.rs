@@ -1,15 +1,15 @@
-//! The simulator's clock: that of the computer, without the time for which the process was stopped.
+//! The simulator's clock: the clock of the computer, less the time for which the process was stopped.
 
 use std::time::Instant as SystemInstant;
 
 use protocol_core::time::{Duration, Instant};
 use rustix::event::Timespec;
 
-/// After a longer absence, the process was stopped (Ctrl-Z, a debugger), and the arm with it. After a shorter absence, on
-/// a busy computer, the arm catches up.
+/// A longer pause between calls means that the process was stopped (Ctrl-Z, a debugger), and the arm stops with it. After a
+/// shorter pause, on a busy computer, the arm catches up.
 const LONGEST_ABSENCE: Duration = Duration::from_millis(1_000);
 
-/// Microseconds since its creation.
+/// A clock that counts microseconds since its creation.
 #[derive(Debug)]
 pub struct RealClock {
     start: SystemInstant,

@@ -50,15 +50,15 @@ pub enum ImageError {
     /// Another process holds the lock.
     #[error("settings image {} is in use by another simulator: end that one, or use --eeprom FILE with a file of its own, or --eeprom none", .0.display())]
     Locked(PathBuf),
-    /// It is not a file of 32 KiB.
+    /// The path is not a file of 32 KiB.
     #[error("{} is no settings image ({found}, not a file of {SIZE} bytes): delete it, or name another with --eeprom FILE", path.display())]
     NotAnImage {
         /// The path.
         path: PathBuf,
-        /// A description of what the path is.
+        /// The length of the file, or that it is no regular file.
         found: String,
     },
-    /// It has the right size, but is not blank and has no valid record.
+    /// The file has the right size, but is not blank and has no valid record.
     #[error("settings image {} is damaged: delete it to start with default settings, or name another with --eeprom FILE", .0.display())]
     Damaged(PathBuf),
     /// The operating system refused.
@@ -74,7 +74,7 @@ pub enum ImageError {
 }
 
 impl Eeprom {
-    /// The path of the image; `None` for memory. Each arm with a number has its own file.
+    /// The path of the image; `None` for memory. With several arms, each number has its own file.
     ///
     /// # Errors
     /// [`ImageError::NoStateDirectory`].
@@ -87,8 +87,8 @@ impl Eeprom {
         Ok(Some(per_arm::path(&path, arm)))
     }
 
-    /// Opens the image as a flash, and creates a blank image if there is none. It is locked against other simulators while
-    /// it is open.
+    /// Opens the image as a flash, and creates a blank image if there is none. The image is locked against other simulators
+    /// while it is open.
     ///
     /// # Errors
     /// See [`ImageError`].
@@ -115,7 +115,7 @@ impl Eeprom {
         })?;
         check_size(&file, &path)?;
         let image = ImageFile::open(file).map_err(|cause| refused("read", cause))?;
-        // Opening a damaged journal erases the flash, so a copy is opened.
+        // Opening a damaged journal erases the flash, so open a copy to check it.
         match Journal::open(Flash::on(image.copy())) {
             (_, Opened::Damaged) => Err(ImageError::Damaged(path)),
             _ => Ok(Flash::on(image)),
@@ -138,7 +138,7 @@ fn users_own(variable: impl Fn(&str) -> Option<PathBuf>) -> Result<PathBuf, Imag
 fn make_blank(path: &Path) -> io::Result<()> {
     let mut draft = path.as_os_str().to_owned();
     draft.push(format!(".{}.new", std::process::id()));
-    // Removes what an earlier program left. A link that another user planted is removed too, and not followed.
+    // Remove a draft that an earlier process left. A symbolic link that another user planted is removed, not followed.
     let _ = fs::remove_file(&draft);
     let made = write_blank(Path::new(&draft)).and_then(|()| publish(Path::new(&draft), path));
     if made.is_err() {
@@ -205,7 +205,7 @@ mod tests {
         Eeprom::File(path.clone()).open(None).unwrap();
         assert_eq!(fs::read(&victim).unwrap(), b"letters");
         assert!(fs::symlink_metadata(&path).unwrap().is_file() && !draft.exists());
-        // Nor is one that was planted directly before the file is made.
+        // A link that is planted just before the file is created is not followed either.
         std::os::unix::fs::symlink(&victim, &draft).unwrap();
         assert!(write_blank(&draft).is_err());
         assert_eq!(fs::read(&victim).unwrap(), b"letters");

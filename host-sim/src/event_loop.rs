@@ -1,7 +1,7 @@
 //! The loop that serves arms on pseudo-terminals: clock, file descriptors and signals.
 //!
-//! One thread sleeps until a client writes, comes or goes, until a signal comes, or until an arm is due. An idle arm
-//! costs nothing. An arm whose port fails ends; the others continue.
+//! One thread sleeps until a client writes, opens or closes a port, until a signal comes, or until an arm is due. An idle arm
+//! needs few wake-ups. An arm whose port fails ends; the others continue.
 
 use std::io;
 use std::mem::MaybeUninit;
@@ -23,15 +23,15 @@ use crate::signals::{SignalAction, Signals};
 use crate::virtual_clock::VirtualClock;
 use tty_ports::clients::Clients;
 
-/// Events per call; the other events follow in the next call.
+/// The most events per call; the other events follow in the next call.
 const EVENTS: usize = 64;
 /// The timeout of calls that do not wait.
 const NO_WAIT: Timespec = Timespec { tv_sec: 0, tv_nsec: 0 };
-/// The event data of the signals. Smaller numbers are those of the arms.
+/// The event data of the signals. The ports of the arms have the numbers of the arms, from 0.
 const SIGNALS: u64 = u64::MAX;
 /// The event data of the clients.
 const CLIENTS: u64 = u64::MAX - 1;
-/// The event data of the control socket of the first arm.
+/// The event data of the control socket of the first arm. The numbers of the other control sockets follow.
 const CONTROL: u64 = 1 << 32;
 
 /// The arms of a process.
@@ -51,12 +51,12 @@ struct ArmEntry<F, C> {
     due: Instant,
     /// The events of its port that epoll reports.
     interest: EventFlags,
-    /// Its port failed: it is not polled any more.
+    /// Its port failed: the arm is not polled any more.
     has_failed: bool,
 }
 
 impl<F: NorFlash + Clone, C: ArmController> EventLoop<F, C> {
-    /// A loop for these arms. `clients` counts their clients.
+    /// A loop for these arms. `clients` reports their clients.
     ///
     /// # Errors
     /// The operating system refuses an epoll instance or an entry in it.
@@ -99,7 +99,7 @@ impl<F: NorFlash + Clone, C: ArmController> EventLoop<F, C> {
         loop {
             let mut space = [MaybeUninit::uninit(); EVENTS];
             let due = self.arms.iter().map(|entry| entry.due).min().unwrap_or(Instant::FAR_FUTURE);
-            // Only lockstep needs it.
+            // Only lockstep uses this value.
             let is_busy = clock.is_in_lockstep() && self.is_host_line_busy();
             let events = self.wait(&clock.sleep(due, is_busy), &mut space)?;
             let now = clock.tick(due, is_busy);
@@ -115,7 +115,7 @@ impl<F: NorFlash + Clone, C: ArmController> EventLoop<F, C> {
                     number => self.poll_arm(index(number), clock.now())?,
                 }
             }
-            // A snapshot that was restored has another time.
+            // Restoring a snapshot changes the virtual time.
             let now = clock.now();
             self.wake_arms_with_news(now);
             for number in 0..self.arms.len() {
@@ -152,7 +152,7 @@ impl<F: NorFlash + Clone, C: ArmController> EventLoop<F, C> {
         }
     }
 
-    /// Executes the actions of signals. Returns whether the loop ends.
+    /// Executes the actions of signals. Returns whether the loop has to end.
     fn apply_signals(&mut self, signals: &mut Signals, now: Instant) -> bool {
         for action in signals.actions() {
             match action {
@@ -172,7 +172,7 @@ impl<F: NorFlash + Clone, C: ArmController> EventLoop<F, C> {
         }
     }
 
-    /// An arm is due at once if clients opened or closed its port.
+    /// Makes an arm due at once if clients opened or closed its port.
     fn wake_arms_with_news(&mut self, now: Instant) {
         let Some(clients) = &mut self.clients else { return };
         if clients.take_has_changed() {
@@ -198,7 +198,7 @@ impl<F: NorFlash + Clone, C: ArmController> EventLoop<F, C> {
         Ok(())
     }
 
-    /// Polls an arm. If its port fails, the arm ends; an error means that no arm is left.
+    /// Polls an arm. If its port fails, the arm ends. Returns an error only if no arm is left.
     fn poll_arm(&mut self, number: usize, now: Instant) -> io::Result<()> {
         let Some(entry) = self.arms.get_mut(number).filter(|entry| !entry.has_failed) else { return Ok(()) };
         let Err(failure) = entry.poll(number, now, self.clients.as_mut(), &self.epoll) else { return Ok(()) };
@@ -225,7 +225,7 @@ impl<F: NorFlash + Clone, C: ArmController> ArmEntry<F, C> {
         Ok(())
     }
 
-    /// Does a client of the control socket wait for this time?
+    /// Is an answer due for which a client of the control socket waits?
     fn is_control_due(&self, now: Instant) -> bool {
         self.control.as_ref().and_then(ControlSocket::due).is_some_and(|due| due <= now)
     }

@@ -1,4 +1,4 @@
-//! Why the program `host-sim` fails, and its exit status.
+//! The errors of the program `host-sim`, and their exit statuses.
 
 use std::io;
 

@@ -10,7 +10,7 @@ use embedded_storage::nor_flash::NorFlashErrorKind;
 use tracing::warn;
 
 /// A settings image of [`SIZE`] bytes in memory, and in a file if it has one. Every operation reaches the file before it
-/// returns, in the order of the calls: a `kill -9` leaves what a power cut would leave.
+/// returns, in the order of the calls. So a `kill -9` leaves the same states as a power cut.
 #[derive(Clone, Debug)]
 pub struct ImageFile {
     memory: Memory,
@@ -19,7 +19,7 @@ pub struct ImageFile {
 }
 
 impl ImageFile {
-    /// A blank image that ends with the process.
+    /// A blank image without a file, which ends with the process.
     #[must_use]
     pub fn in_memory() -> Self {
         Self { memory: Memory::default(), file: None }
@@ -28,14 +28,14 @@ impl ImageFile {
     /// The image in a file.
     ///
     /// # Errors
-    /// The file cannot be read, or is shorter.
+    /// The file cannot be read, or is shorter than [`SIZE`].
     pub fn open(file: File) -> io::Result<Self> {
         let mut bytes = vec![0; SIZE];
         file.read_exact_at(&mut bytes, 0)?;
         Ok(Self { memory: Memory::holding(bytes), file: Some(Arc::new(file)) })
     }
 
-    /// A copy without the file.
+    /// A copy of the bytes, without the file.
     #[must_use]
     pub fn copy(&self) -> Memory {
         self.memory.clone()

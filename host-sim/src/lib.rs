@@ -4,7 +4,7 @@
 //!             EventLoop: clock, file descriptors, signals
 //!            ┌───────────────────────────────────────────────────────┐
 //!            │ PtyArm ×N                                             │
-//!  client ◀──▶ Pty ◀──▶ arm_sim::SimulatedArm: controller, servos      │
+//!  client ◀──▶ Pty ◀──▶ arm_sim::SimulatedArm: controller, servos    │
 //!            │                    └─▶ Flash in an ImageFile          │
 //!            └───────────────────────────────────────────────────────┘
 //! ```

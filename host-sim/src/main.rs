@@ -50,7 +50,7 @@ use failure::Failure;
 /// The log target of frames. `--trace` shows it at any log level.
 const FRAMES: &str = "frames";
 
-/// With --lockstep the servos have started when the port is ready: no virtual time passes before the first byte.
+/// With --lockstep virtual time starts here, so that the servos have started: no virtual time passes before the first byte.
 const LOCKSTEP_START: Instant = Instant::from_micros(1_000_000);
 
 fn main() -> ExitCode {
@@ -96,7 +96,7 @@ fn log_to_stderr(options: &Options) {
 fn run(options: &Options) -> Result<(), Failure> {
     if let Some(path) = &options.replay {
         let lines = session_file::replay(path)?;
-        // An error is ignored: standard output may be closed.
+        // Ignore an error: standard output may be closed.
         let _ = writeln!(io::stdout(), "{}: {lines} lines replayed, all equal", path.display());
         return Ok(());
     }
@@ -199,7 +199,7 @@ fn run_arms<C: ArmController>(options: &Options, signals: &mut Signals) -> Resul
         ports.push((Pty::open(clients.as_mut()).map_err(Failure::Port)?, flash(options, number)?));
     }
     let paths: Vec<PathBuf> = ports.iter().map(|(pty, _)| pty.path().to_owned()).collect();
-    // They exist as long as the loop runs.
+    // Dropping the links removes them, so keep them while the loop runs.
     let _symlinks = symlinks(options, &numbers, &paths)?;
     let arms = numbers.iter().zip(ports);
     let arms = arms.map(|(&number, (pty, flash))| simulated_arm::<C>(options, number, pty, flash, &clock));
@@ -257,7 +257,7 @@ fn symlinks(
         .collect()
 }
 
-/// The control sockets of the arms. If the default one cannot be created, the arm has none.
+/// The control sockets of the arms. If a default socket cannot be created, the arm has none; an explicit path is an error.
 fn control_sockets(
     options: &Options,
     numbers: &[Option<u16>],
@@ -289,7 +289,7 @@ fn arm<B: ServoBus, C: ArmController>(
     now: Instant,
     bus: B,
 ) -> PtyArm<Flash<ImageFile>, B, C> {
-    // At level error, so that every log level shows it.
+    // The span has level error, so that every log level shows it.
     let span = number.map_or_else(Span::none, |number| error_span!("arm", number));
     let inside = span.enter();
     let chip_id = per_arm::chip_id(options.chip_id, number);
@@ -318,7 +318,7 @@ fn allow_as_many_files_as_possible() {
     let _ = setrlimit(Resource::Nofile, Rlimit { current: limit.maximum, ..limit });
 }
 
-/// Prints one line per port to standard output. Errors are ignored: nothing has to read these lines.
+/// Prints one line per port to standard output. Errors are ignored: a reader of these lines is optional.
 fn print_ready(ports: &[PathBuf]) {
     let mut out = BufWriter::new(io::stdout().lock());
     let written = ports.iter().try_for_each(|port| writeln!(out, "ready {}", port.display()));

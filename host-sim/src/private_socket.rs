@@ -21,7 +21,7 @@ pub enum SocketError {
         /// The path.
         path: PathBuf,
     },
-    /// Another process listens there.
+    /// Another process listens at the path.
     #[error("--{option} {}: another simulator listens there: end that one, or choose another path", path.display())]
     InUse {
         /// The option with the path.
@@ -50,8 +50,7 @@ pub struct PrivateSocket {
 }
 
 impl PrivateSocket {
-    /// Listens at `path`, for this user only. Replaces a socket that an earlier simulator may have left. `option` is for
-    /// the errors.
+    /// Listens at `path`, for this user only. Replaces a socket on which no process listens. The errors name `option`.
     ///
     /// # Errors
     /// See [`SocketError`].
@@ -67,7 +66,7 @@ impl PrivateSocket {
             Ok(_) => fs::remove_file(path).map_err(refused)?,
             Err(_) => {}
         }
-        // With this mask, other users cannot open the file at any time.
+        // With this mask, other users cannot open the socket, not even right after it was created.
         let mask = umask(Mode::RWXG | Mode::RWXO | Mode::XUSR);
         let listener = UnixListener::bind(path);
         umask(mask);
@@ -77,7 +76,7 @@ impl PrivateSocket {
         Ok(Self { listener, path: path.to_owned(), inode })
     }
 
-    /// The next client, which does not block. `None` if there is none.
+    /// Accepts the next client, as a stream that does not block. `None` if there is none.
     ///
     /// # Errors
     /// The operating system fails.
@@ -113,7 +112,7 @@ impl Drop for PrivateSocket {
     }
 }
 
-/// Does the operation work if it is tried again later?
+/// Can the operation succeed if it is tried again later?
 #[must_use]
 pub fn is_temporary(error: &io::Error) -> bool {
     matches!(

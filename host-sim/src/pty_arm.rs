@@ -22,7 +22,7 @@ use crate::snapshots::{SnapshotError, Snapshots};
 use tty_ports::clients::Clients;
 use tty_ports::pty::Pty;
 
-/// Faults that ended by themselves, of which the reports are kept.
+/// The most reports of faults that ended by themselves to keep.
 const ENDED_FAULTS: usize = 16;
 
 /// An arm on a pseudo-terminal.
@@ -32,7 +32,7 @@ pub struct PtyArm<F, B = Plant, C = Controller> {
     pty: Pty,
     /// The client does not read, and the kernel's buffers are full.
     is_blocked: bool,
-    /// Only clients at the arm's baud rate are heard and answered.
+    /// Bytes pass only from and to clients at the arm's baud rate.
     is_strict: bool,
     /// The span of its log lines.
     span: Span,
@@ -58,17 +58,17 @@ impl<F: NorFlash + Clone, B: ServoBus> PtyArm<F, B> {
 }
 
 impl<F: NorFlash + Clone, C: ArmController> PtyArm<F, Plant, C> {
-    /// Gives the arm a fault until it is taken back.
+    /// Adds a fault until it is removed.
     pub fn set_fault(&mut self, now: Instant, fault: ArmFault) {
         self.simulation.set_fault(now, fault, None);
     }
 
-    /// Draws the faults of the host line from this seed.
+    /// Sets the seed of the random faults of the host line.
     pub fn set_seed(&mut self, seed: u64) {
         self.simulation.set_seed(seed);
     }
 
-    /// Does something to the arm. Returns the reports of the faults that this ended.
+    /// Carries out an action and logs it. Returns the reports of the faults that it ended.
     pub fn act(&mut self, now: Instant, action: Action) -> Vec<FaultReport> {
         let _inside = self.span.enter();
         info!("{action}");
@@ -80,7 +80,7 @@ impl<F: NorFlash + Clone, C: ArmController> PtyArm<F, Plant, C> {
         &mut self.simulation
     }
 
-    /// Is a byte on the host line?
+    /// Is a byte on the host line, in either direction?
     pub(crate) fn is_host_line_busy(&self) -> bool {
         self.simulation.is_host_line_busy()
     }
@@ -104,16 +104,16 @@ impl<F: NorFlash + Clone, C: ArmController> PtyArm<F, Plant, C> {
         &self.ended_faults
     }
 
-    /// Keeps a copy of the arm. It replaces one of the same name.
+    /// Keeps a copy of the arm. It replaces a copy of the same name.
     ///
     /// # Errors
-    /// The name is wrong, or there are too many others.
+    /// The name is empty or too long, or there are too many copies.
     pub fn keep_snapshot(&mut self, name: String) -> Result<(), SnapshotError> {
         let (simulation, ended_faults) = (self.simulation.clone(), self.ended_faults.clone());
         self.snapshots.keep(name, ArmSnapshot { simulation, ended_faults })
     }
 
-    /// Sets the arm back to a copy. Returns the time of the copy.
+    /// Restores the arm to a copy. Returns the virtual time of the copy.
     ///
     /// # Errors
     /// There is no such copy, or its settings cannot be written.
@@ -147,31 +147,31 @@ impl<F: NorFlash + Clone, B: ServoBus, C: ArmController> PtyArm<F, B, C> {
         }
     }
 
-    /// Hears and answers only clients that have the arm's baud rate, as on a serial line.
+    /// Passes bytes only from and to clients that have the arm's baud rate, as on a serial line.
     pub const fn set_strict_baud(&mut self) {
         self.is_strict = true;
     }
 
-    /// Do bytes pass between the client and the arm?
+    /// Do bytes pass between the client and the arm? Not at another baud rate, if that is checked.
     fn has_clients_rate(&self) -> io::Result<bool> {
         Ok(!self.is_strict || self.pty.baud()? == self.simulation.baud())
     }
 
-    /// Switches it off and on.
+    /// Switches the arm off and on.
     pub fn power_cycle(&mut self, now: Instant) {
         let _inside = self.span.enter();
         info!("power cycle");
         self.simulation.power_cycle(now);
     }
 
-    /// Restarts its controller. The servos keep their power.
+    /// Restarts the controller of the arm. The servos keep their power.
     pub fn restart_controller(&mut self, now: Instant) {
         let _inside = self.span.enter();
         info!("restart of the controller");
         self.simulation.restart_controller(now);
     }
 
-    /// Logs that its port failed.
+    /// Logs that the port failed.
     pub(crate) fn report_failure(&self, failure: &io::Error) {
         let _inside = self.span.enter();
         error!("the port failed ({failure}): this arm ends");
@@ -195,7 +195,8 @@ impl<F: NorFlash + Clone, B: ServoBus, C: ArmController> PtyArm<F, B, C> {
             }
             was_emptied = self.pty.update_clients(clients)?;
         }
-        // Without a client the bytes are those of the last one, and otherwise those of the next one.
+        // If there was a moment without a client: with a client now, the bytes are from this next client; without one, they are
+        // from the last client.
         if was_emptied && self.pty.has_client() {
             self.simulation.host_disconnect();
         }
@@ -214,7 +215,7 @@ impl<F: NorFlash + Clone, B: ServoBus, C: ArmController> PtyArm<F, B, C> {
         Ok(self.simulation.deadline(self.pty.has_client()))
     }
 
-    /// Writes the arrived bytes to the client, or drops them without a client. Returns whether the line has more room.
+    /// Writes the arrived bytes to the client, or drops them if there is none. Returns whether the line has more room.
     fn deliver(&mut self) -> io::Result<bool> {
         let mut has_delivered = false;
         self.is_blocked = false;

@@ -34,13 +34,13 @@ use tty_ports::serial::Serial;
 const PIECE: usize = 4_096;
 /// The first line about the servo bus is logged after this time.
 const FIRST_REPORT: Duration = Duration::from_millis(2_000);
-/// The period of these lines.
+/// The period of the lines about the servo bus.
 const REPORT_PERIOD: Duration = Duration::from_millis(10_000);
 /// The period of attempts to open the port after the adapter was unplugged.
 const SEARCH_PERIOD: Duration = Duration::from_millis(500);
 /// The frame that damps the servos is sent this many times, as after a fault of the controller.
 const REPEATS: usize = 3;
-/// The pause before each of them: longer than a servo needs to answer.
+/// The pause before each of these frames: longer than a servo needs to answer.
 const PAUSE: std::time::Duration = std::time::Duration::from_millis(5);
 /// Register 242 if all joints are missing.
 const ALL_MISSING: u8 = 0x7F;
@@ -120,7 +120,7 @@ impl<F: NorFlash + Clone> RealServos<F> {
                 }
             }
             self.read_bus(now);
-            // In each turn: with unread reports, poll(2) does not wait.
+            // Read the reports of inotify in each turn: poll(2) does not wait while there are unread ones.
             if let Some(clients) = &mut self.clients {
                 clients.update()?;
             }
@@ -152,7 +152,7 @@ impl<F: NorFlash + Clone> RealServos<F> {
         let Some(serial) = self.serial.as_ref().filter(|_| !bytes.is_empty()) else { return };
         match serial.write(&bytes) {
             Ok(count) if count == bytes.len() => self.statistics.sent(now, &bytes),
-            // The controller finds that the servo does not answer.
+            // The controller notices that the answer is missing.
             Ok(_) => warn!("the adapter takes no more bytes: a frame is lost"),
             Err(error) => self.lose_port(now, &error),
         }
@@ -165,8 +165,8 @@ impl<F: NorFlash + Clone> RealServos<F> {
         self.search_at = now + SEARCH_PERIOD;
     }
 
-    /// Opens the port again, but only after the controller has flagged every servo as missing. Then it sends questions
-    /// only, so a servo that has restarted does not get an old goal.
+    /// Opens the port again, but only after the controller has flagged every servo as missing. From then on the controller
+    /// sends only questions, so a servo that has restarted does not get an old goal (D12).
     fn look_for_port(&mut self, now: Instant) {
         if self.serial.is_some() || now < self.search_at {
             return;
@@ -198,7 +198,7 @@ impl<F: NorFlash + Clone> RealServos<F> {
         info!("servo bus: {} servos, {figures}", (!missing & ALL_MISSING).count_ones());
     }
 
-    /// Damps the servos, unless the options say otherwise.
+    /// Damps the servos, unless [`BusConfig::holds_on_exit`] is set.
     fn damp_servos(&self) {
         if self.config.holds_on_exit {
             return info!("the servos hold their goals, as --hold-on-exit says");
@@ -224,7 +224,7 @@ impl<F: NorFlash + Clone> RealServos<F> {
         info!("state 0: the servos are damped");
     }
 
-    /// Sleeps until bytes arrive, a client comes or goes, a signal comes, or a deadline.
+    /// Sleeps until `due`, until bytes arrive, until a client comes or goes, or until a signal comes.
     fn sleep(&self, clock: &mut RealClock, due: Instant, signals: &Signals) -> io::Result<()> {
         let time = sleep_until(clock.now(), due);
         let signals = signals.as_fd();
@@ -264,7 +264,7 @@ fn log_opened(config: &BusConfig, serial: &Serial) {
     );
 }
 
-/// Logs which servos were found. If there are none, the bytes on the bus give the advice.
+/// Logs which servos were found. If no servo answers, the advice depends on whether bytes were received.
 fn log_servos_found(config: &BusConfig, missing: u8, figures: &Figures) {
     let name = |found: bool| {
         let joints = Joint::ALL.into_iter().filter(|joint| (missing & joint.bit() == 0) == found);

@@ -1,7 +1,7 @@
 //! Simulated servos on a unix socket, for a controller in another process: the firmware in an emulator.
 //!
-//! One controller can be connected at a time. The servos keep their state from one controller to the next. A bus has no
-//! flow control: bytes that the controller does not read are lost.
+//! One controller can be connected at a time. The servos keep their state when the next controller connects. A servo bus has
+//! no flow control: bytes that the controller does not read are lost.
 
 use std::io::{self, Read, Write};
 use std::os::fd::{AsFd, BorrowedFd};

@@ -37,7 +37,7 @@ pub struct AdapterConfig {
     pub baud: u32,
     /// The latency of the adapter.
     pub latency: Latency,
-    /// The seed of its delays.
+    /// The seed of the random delays of the adapter.
     pub seed: u64,
 }
 
@@ -61,7 +61,7 @@ pub struct ServosOnly {
     port: Option<AdapterPort>,
     /// Bytes from the adapter that were not written to the port.
     to_client: Vec<u8>,
-    /// Gets the direction and the bytes on the wire.
+    /// Receives the direction and the bytes on the wire.
     trace: Option<fn(&str, &[u8])>,
 }
 
@@ -70,7 +70,7 @@ pub struct ServosOnly {
 struct AdapterPort {
     pty: Pty,
     clients: Option<Clients>,
-    /// It exists as long as the port.
+    /// Dropped with the port, which removes the link.
     _symlink: Option<Symlink>,
 }
 
@@ -181,7 +181,8 @@ impl ServosOnly {
         Ok(())
     }
 
-    /// A bus has no flow control: bytes that the client does not read are lost.
+    /// Writes the bytes of the adapter to the client. A servo bus has no flow control: bytes that the client does not read are
+    /// lost.
     fn write_client(&mut self) -> io::Result<()> {
         let bytes = std::mem::take(&mut self.to_client);
         let Some(AdapterPort { pty, .. }) = &self.port else { return Ok(()) };

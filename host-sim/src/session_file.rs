@@ -15,23 +15,23 @@ use crate::cli::Options;
 use crate::per_arm;
 use crate::trace::Trace;
 
-/// Why a file cannot be recorded or replayed, or that the replay differs.
+/// Why a session cannot be recorded or replayed, or where the replay differs.
 #[derive(Debug, thiserror::Error)]
 pub enum SessionFileError {
     /// The file cannot be created, read or written.
     #[error("cannot {verb} {}: {cause}", path.display())]
     File {
-        /// What was tried.
+        /// The operation that failed: `read` or `write`.
         verb: &'static str,
         /// The file.
         path: PathBuf,
-        /// The reason of the system.
+        /// The system's reason.
         cause: io::Error,
     },
-    /// The file to record exists.
+    /// The file to record to exists.
     #[error("--record {}: the file exists: choose another name, or replace it with --force", .0.display())]
     Exists(PathBuf),
-    /// The file is no session.
+    /// The file is not a session.
     #[error("{}: {reason}", path.display())]
     NoSession {
         /// The file.
@@ -39,7 +39,7 @@ pub enum SessionFileError {
         /// What is wrong.
         reason: ReplayError,
     },
-    /// The arm sent something else than in the file.
+    /// The arm sent other bytes than in the file.
     #[error("{}, line {line}: {difference}{}", path.display(), in_words(frame))]
     Different {
         /// The file.
@@ -73,7 +73,7 @@ impl SentFrames {
         Self { trace, last }
     }
 
-    /// Takes a line of the session. Returns the last frame that ends in it.
+    /// Takes a line of the session. Returns the last frame that ends in this line.
     fn line(&mut self, line: &str) -> Option<String> {
         if let Ok(Entry { now, event: SessionEvent::Taken(bytes) }) = line.parse() {
             self.trace.sent(now, &bytes);
@@ -108,13 +108,13 @@ pub struct SessionFile {
 }
 
 impl SessionFile {
-    /// Creates the file and writes its first lines. Only with `may_replace` replaces one that exists.
+    /// Creates the file and writes its first lines. Replaces an existing file only with `may_replace`.
     ///
     /// # Errors
     /// The file exists, or cannot be created or written.
     pub fn create(path: &Path, header: &SessionHeader, may_replace: bool) -> Result<Self, SessionFileError> {
         let failed = |cause| SessionFileError::File { verb: "write", path: path.to_owned(), cause };
-        // A pipe or a device loses nothing.
+        // Opening a pipe or a device destroys no data.
         if !may_replace && path.is_file() {
             return Err(SessionFileError::Exists(path.to_owned()));
         }
@@ -127,7 +127,7 @@ impl SessionFile {
 impl SessionRecorder for SessionFile {
     fn add(&mut self, entry: &Entry) {
         let Some(file) = &mut self.file else { return };
-        // One call of the system for each line.
+        // One system call writes the whole line.
         if let Err(cause) = file.write_all(format!("{entry}\n").as_bytes()) {
             error!("cannot write {}: {cause}: the recording ends here", self.path.display());
             self.file = None;
@@ -138,7 +138,7 @@ impl SessionRecorder for SessionFile {
 /// Replays a file. Returns the number of its lines.
 ///
 /// # Errors
-/// The file cannot be read, is no session, or the arm sent something else.
+/// The file cannot be read, is not a session, or the arm sent other bytes.
 pub fn replay(path: &Path) -> Result<usize, SessionFileError> {
     let failed = |cause| SessionFileError::File { verb: "read", path: path.to_owned(), cause };
     let told = |reason, frame| match reason {

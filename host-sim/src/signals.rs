@@ -14,7 +14,7 @@ use tracing::warn;
 pub enum SignalAction {
     /// SIGHUP: switch the arm off and on.
     PowerCycle,
-    /// SIGUSR1: unplug the adapter, or plug it in again. Without an adapter of its own the program ignores it.
+    /// SIGUSR1: unplug the simulated adapter, or plug it in again. Ignored without `--servos-only`.
     Unplug,
     /// SIGUSR2: restart the controller, with the servos under power.
     RestartController,
@@ -37,7 +37,7 @@ impl Signals {
         Ok(Self(SignalDelivery::with_pipe(read, write, SignalOnly, signals)?))
     }
 
-    /// Says that [`SignalAction::Unplug`] has no effect here.
+    /// Logs that [`SignalAction::Unplug`] has no effect here.
     pub fn warn_of_unplug() {
         warn!("SIGUSR1 is ignored: only with --servos-only there is an adapter to unplug");
     }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use embedded_storage::nor_flash::NorFlashErrorKind;
 
-/// Copies of an arm. Each has about 20 KiB.
+/// The most copies of an arm. Each takes about 20 KiB.
 const SNAPSHOTS: usize = 64;
 /// The longest name, in characters.
 const LONGEST_NAME: usize = 64;
@@ -23,7 +23,7 @@ pub enum SnapshotError {
     Unknown {
         /// The name.
         name: String,
-        /// The names that there are.
+        /// The names of the snapshots that exist.
         others: Vec<String>,
     },
     /// The settings cannot be written.
@@ -59,10 +59,10 @@ impl<T> Snapshots<T> {
         Self(BTreeMap::new())
     }
 
-    /// Keeps a copy. It replaces one of the same name.
+    /// Keeps a copy. It replaces a copy of the same name.
     ///
     /// # Errors
-    /// The name is wrong, or there are 64 others.
+    /// The name is empty or too long, or there are 64 other copies.
     pub fn keep(&mut self, name: String, copy: T) -> Result<(), SnapshotError> {
         if !(1..=LONGEST_NAME).contains(&name.chars().count()) {
             return Err(SnapshotError::Name);
@@ -77,7 +77,7 @@ impl<T> Snapshots<T> {
     /// The copy with this name.
     ///
     /// # Errors
-    /// There is none.
+    /// There is no copy with this name. The error lists the other names.
     pub fn get(&self, name: &str) -> Result<&T, SnapshotError> {
         let unknown =
             || SnapshotError::Unknown { name: name.to_owned(), others: self.0.keys().cloned().collect() };

@@ -7,7 +7,7 @@
 //!   -> 3 bytes that are no frame: 01 02 03
 //! ```
 //!
-//! The trace has deframers of its own, so it does not change the traffic. It does not show the effect of a request.
+//! The trace has deframers of its own, so it does not change the traffic. It does not show the effects of requests.
 
 use arm_sim::tap::Tap;
 use protocol_core::time::{Duration, Instant};

@@ -5,9 +5,9 @@
 //! | --- | --- |
 //! | a factor | passes at this speed, as long as the computer is fast enough |
 //! | max | goes from event to event without sleeping |
-//! | paused | stands |
-//! | advance | goes from event to event until its end, then the mode before continues |
-//! | lockstep | goes from event to event while a byte is on the host line, and stands otherwise; after each timeout of real time without a byte it goes on by a millisecond |
+//! | paused | does not pass |
+//! | advance | goes from event to event until the end of the advance, then the previous mode continues |
+//! | lockstep | goes from event to event while a byte is on the host line, and does not pass otherwise; after each timeout of real time without a byte it goes on by a millisecond |
 
 use protocol_core::time::{Duration, Instant};
 use rustix::event::Timespec;
@@ -41,10 +41,10 @@ pub struct VirtualClock {
     rest_nanos: u64,
     speed: TimeSpeed,
     is_paused: bool,
-    /// Virtual time goes from event to event until then.
+    /// Virtual time goes from event to event until this time.
     advance_until: Instant,
     lockstep: Option<ClientLockstep>,
-    /// Several arms have this time.
+    /// Several arms share this clock.
     is_shared: bool,
 }
 
@@ -85,7 +85,7 @@ impl VirtualClock {
         self.now
     }
 
-    /// Goes on, and returns the virtual time. `due` is the next event of an arm. `is_busy` tells that a byte is on the host
+    /// Advances the clock, and returns the virtual time. `due` is the next event of an arm. `is_busy`: a byte is on the host
     /// line. Must be called at least once a second.
     pub fn tick(&mut self, due: Instant, is_busy: bool) -> Instant {
         let real = self.real.now();
@@ -142,14 +142,14 @@ impl VirtualClock {
     /// Stops virtual time, or lets it go on.
     ///
     /// # Errors
-    /// It follows the client.
+    /// Virtual time follows the client.
     pub fn pause(&mut self, is_paused: bool) -> Result<(), FollowsClient> {
         self.check()?;
         self.is_paused = is_paused;
         Ok(())
     }
 
-    /// Sets the speed, and ends a pause.
+    /// Sets the speed. Ends a pause.
     ///
     /// # Errors
     /// Virtual time follows the client.
@@ -164,25 +164,25 @@ impl VirtualClock {
         if self.lockstep.is_some() { Err(FollowsClient) } else { Ok(()) }
     }
 
-    /// Lets this much virtual time pass as fast as possible. Returns its end.
+    /// Lets this much virtual time pass as fast as possible. Returns the virtual time at the end.
     pub fn advance(&mut self, time: Duration) -> Instant {
         let end = self.now + time;
         self.advance_until = self.advance_until.max(end);
         end
     }
 
-    /// Sets whether several arms have this time.
+    /// Sets whether several arms share this clock.
     pub const fn set_shared(&mut self, is_shared: bool) {
         self.is_shared = is_shared;
     }
 
-    /// Do several arms have this time?
+    /// Do several arms share this clock?
     #[must_use]
     pub const fn is_shared(&self) -> bool {
         self.is_shared
     }
 
-    /// Sets virtual time. An advance that has not ended goes on to its end.
+    /// Sets virtual time, forward or back. An advance that has not ended goes on to the same end.
     pub fn set_now(&mut self, now: Instant) {
         if self.advance_until <= self.now {
             self.advance_until = Instant::ZERO;
@@ -191,7 +191,7 @@ impl VirtualClock {
         self.rest_nanos = 0;
     }
 
-    /// The speed; `None` if virtual time stands.
+    /// The speed; `None` during a pause.
     #[must_use]
     pub const fn speed(&self) -> Option<TimeSpeed> {
         if self.is_paused { None } else { Some(self.speed) }
@@ -205,7 +205,7 @@ impl VirtualClock {
 }
 
 impl ClientLockstep {
-    /// The virtual time. `next_event` is set if a byte is on the host line.
+    /// The virtual time after this tick. `next_event` is `None` if no byte is on the host line.
     fn tick(&mut self, real: Instant, now: Instant, next_event: Option<Instant>) -> Instant {
         match next_event {
             Some(event) => {
@@ -232,7 +232,7 @@ impl TimeSpeed {
     }
 }
 
-/// Virtual time follows the client.
+/// The pause or speed cannot be set, because virtual time follows the client.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("virtual time follows the client, because host-sim runs with --lockstep")]
 pub struct FollowsClient;

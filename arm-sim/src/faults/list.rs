@@ -18,7 +18,7 @@ pub(crate) struct ListedFault {
     pub(crate) until: Option<Instant>,
 }
 
-/// The faults, in the order in which they began. No two have the same place.
+/// The faults, in the order in which they began. None of them replaces another (see [`ArmFault::replaces`]).
 #[derive(Clone, Debug, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct FaultList(Vec<ListedFault>);
@@ -44,7 +44,7 @@ impl FaultList {
         self.0.iter().any(|listed| matches!(listed.fault, ArmFault::Obstacle(_, Obstacle::Thing(_))))
     }
 
-    /// Takes what is between the claws.
+    /// Takes the things between the claws.
     pub(crate) fn take_things(&mut self) -> Vec<ListedFault> {
         self.take(|listed| matches!(listed.fault, ArmFault::Obstacle(_, Obstacle::Thing(_))))
     }

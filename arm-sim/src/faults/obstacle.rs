@@ -1,4 +1,4 @@
-//! The words of the obstacles of a joint: `2=wall=60`, `2=wall=60/500`, `2=push=-300`, `7=thing=30`.
+//! The text form of the obstacles of a joint: `2=wall=60`, `2=wall=60/500`, `2=push=-300`, `7=thing=30`.
 
 use alloc::borrow::ToOwned;
 use alloc::string::String;
@@ -11,19 +11,19 @@ use crate::fault_count::FaultCount;
 use crate::plant::{HIGHEST_STIFFNESS, Plant, STRONGEST_PUSH, Thing, Wall};
 use crate::thousandths::Thousandths;
 
-/// Something that a joint meets. It is counted in milliseconds: those in which the joint touched it.
+/// Something that a joint meets. Its count is the number of milliseconds in which the joint touched it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Obstacle {
     /// A wall: in front of the joint or behind it, depending on where the joint is when the wall is set.
     Wall(Wall),
-    /// A hand that pushes, in millinewton metres, towards greater angles.
+    /// A hand that pushes with this torque, in millinewton metres. Positive values are towards greater angles.
     Push(i16),
-    /// A thing between the claws. Only joint 7 has it.
+    /// A thing between the claws. Only joint 7 can meet it.
     Thing(Thing),
 }
 
-/// A word that names no obstacle.
+/// The word is not an obstacle.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "'{0}' is no obstacle: use wall=DEGREES, wall=DEGREES/STIFFNESS with 1 to 5000 mN m per degree, \
@@ -38,7 +38,7 @@ impl Obstacle {
         matches!(word.split('=').next(), Some("wall" | "push" | "thing"))
     }
 
-    /// Can this joint meet it?
+    /// Can this joint meet the obstacle?
     pub(super) const fn is_possible_at(self, joint: Joint) -> bool {
         !matches!(self, Self::Thing(_)) || joint.number() == 7
     }
@@ -61,7 +61,7 @@ impl Obstacle {
         }
     }
 
-    /// How long a joint touched it.
+    /// How long the joint touched the obstacle.
     pub(crate) fn count(self, joint: Joint, plant: &Plant) -> FaultCount {
         match self {
             Self::Wall(_) => plant.wall_count(joint),

@@ -6,7 +6,7 @@ fn at(millis: u64) -> Instant {
     Instant::ZERO + Duration::from_millis(millis)
 }
 
-/// Sends this many zeros through a line with a fault, and returns what arrives.
+/// Sends this many zeros through a line with a fault. Returns the bytes that arrive, and the count of the fault.
 fn received(fault: LineFault, seed: u64, count: usize) -> (Vec<u8>, FaultCount) {
     let mut line = LineDirection::new(seed);
     line.set_fault(fault);

@@ -31,7 +31,7 @@ impl Plant {
         self.rest_until = self.now;
     }
 
-    /// How often the fault of the supply took effect: frames to the servos, or dips.
+    /// How often the fault of the supply took effect: the number of dips for `Dips`, otherwise of frames to the servos.
     #[must_use]
     pub const fn supply_fault_count(&self) -> FaultCount {
         self.supply.count()
@@ -51,13 +51,13 @@ impl Plant {
         }
     }
 
-    /// The weight in the gripper, with that of what it carries of the room, in grams.
+    /// The weight in the gripper, in grams: that of [`Plant::set_load`] and that of a carried object of the room.
     #[must_use]
     pub const fn load_grams(&self) -> u16 {
         self.load_g + self.carried_g
     }
 
-    /// Interrupts the power of one servo at `now`: torque and goal are lost, and no hand holds the joint.
+    /// Interrupts the power of one servo at `now`. Torque and goal are lost, so a loaded joint falls unless a hand holds it.
     pub fn restart_servo(&mut self, now: Instant, joint: Joint) {
         self.advance(now);
         let ready_at = now + self.config.boot_time;
@@ -66,7 +66,7 @@ impl Plant {
         }
     }
 
-    /// Sets whether a goal switches torque on after a servo's own start.
+    /// Sets [`ServoConfig::goal_starts_torque`](crate::servo::ServoConfig::goal_starts_torque) of all servos.
     pub fn set_goal_starts_torque(&mut self, starts_torque: bool) {
         self.config.goal_starts_torque = starts_torque;
         let config = self.config;
@@ -93,12 +93,12 @@ impl Plant {
         self.update_weight();
     }
 
-    /// Lets a hand hold a joint until it has torque. Has no effect on a joint with torque.
+    /// Lets a hand hold a joint until the joint has torque. Has no effect on a joint with torque.
     pub fn hold(&mut self, joint: Joint) {
         self.servo_mut(joint).into_iter().for_each(|servo| servo.hold_by_hand(true));
     }
 
-    /// Ends [`Plant::hold`]: without torque, a loaded joint falls.
+    /// The hand lets the joint go. Without torque, a loaded joint then falls.
     pub fn let_go(&mut self, joint: Joint) {
         self.servo_mut(joint).into_iter().for_each(|servo| servo.hold_by_hand(false));
     }

@@ -12,7 +12,8 @@ use crate::parameters::{
     REAR_ARM_MM, SHOULDER_FORWARD_MM, TOOL_CENTRE_MM, TOOL_G,
 };
 
-/// A mass of the arm, in the frame of the forearm: along it, at a right angle in its plane, and to the side.
+/// A mass of the arm, and its position in the frame of the forearm in mm: along the forearm, at a right angle to it in the
+/// plane of the arm, and to the side.
 struct Mass {
     grams: i64,
     along: i64,
@@ -20,8 +21,8 @@ struct Mass {
     aside: i64,
 }
 
-/// The inertia of the arm about each joint, without its servo, in gram square millimetres, with this weight in the
-/// gripper in grams.
+/// The inertia of the arm about each joint, without the joint's servo, in gram square millimetres. `load_g` is the weight in
+/// the gripper in grams.
 pub(crate) fn inertias(pose: JointSines, load_g: i64) -> [i64; JOINTS] {
     let JointSines { rear, drop, roll, pitch } = pose;
     let at_tool = |grams, distance| Mass {

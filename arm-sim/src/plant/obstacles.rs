@@ -1,6 +1,6 @@
 //! What the arm meets: walls, a hand that pushes, a thing between the claws, and alarms that are forced on its servos.
 //!
-//! Angles are in thousandths of a degree, true ones, without any offset. Joint 7 closes towards smaller angles.
+//! Angles are true angles, without any offset, in thousandths of a degree. Joint 7 closes towards smaller angles.
 
 use protocol_core::registers::Joint;
 
@@ -14,7 +14,7 @@ use crate::servo::{Servo, Trip};
 pub const HIGHEST_STIFFNESS: u16 = 5_000;
 /// The greatest torque of a hand, in millinewton metres.
 pub const STRONGEST_PUSH: i16 = 10_000;
-/// A thing that the claws have touched falls when they open beyond it by this, in thousandths of a degree. Assumed.
+/// The claws drop a thing that they have touched when they open this far beyond it, in thousandths of a degree. Assumed.
 const DROP_DISTANCE: i64 = 2_000;
 /// The joint of the claws.
 const CLAW: Joint = Joint::ALL[6];
@@ -26,8 +26,8 @@ const CLAW: Joint = Joint::ALL[6];
 pub struct Wall {
     /// Where the joint touches it.
     pub millidegrees: i32,
-    /// Its torque for each degree that the joint presses into it, in millinewton metres, 1 to [`HIGHEST_STIFFNESS`].
-    /// `None`: it does not give way.
+    /// The torque of the wall for each degree that the joint presses into it, in millinewton metres, 1 to
+    /// [`HIGHEST_STIFFNESS`]. `None`: the wall does not give way.
     pub stiffness: Option<u16>,
 }
 
@@ -37,12 +37,12 @@ pub struct Wall {
 pub struct Thing {
     /// The angle of joint 7 at which the claws touch it.
     pub millidegrees: i32,
-    /// As [`Wall::stiffness`].
+    /// Like [`Wall::stiffness`].
     pub stiffness: Option<u16>,
 }
 
 impl Plant {
-    /// Puts a wall in the way of a joint, or takes it away. A joint has one wall.
+    /// Puts a wall in the way of a joint, or removes it. A joint has one wall.
     pub fn set_wall(&mut self, joint: Joint, wall: Option<Wall>) {
         let Some(servo) = self.servo_mut(joint) else { return };
         let obstacle = wall.map(|Wall { millidegrees, stiffness }| {
@@ -52,8 +52,8 @@ impl Plant {
         servo.set_wall(obstacle);
     }
 
-    /// Puts a thing between the claws, or takes it away. Joint 7 cannot close any further than its angle. The weight of
-    /// the thing is that of [`Plant::set_load`].
+    /// Puts a thing between the claws, or removes it. Joint 7 cannot close beyond the thing's angle. Set the weight of the thing
+    /// with [`Plant::set_load`].
     pub fn set_thing(&mut self, thing: Option<Thing>) {
         (self.is_thing_gripped, self.room_stop) = (false, None);
         let obstacle = thing.map(|Thing { millidegrees, stiffness }| {
@@ -63,14 +63,15 @@ impl Plant {
         self.servo_mut(CLAW).into_iter().for_each(|servo| servo.set_thing(obstacle));
     }
 
-    /// Drops what is in the gripper: the thing and the weight, and what it carries of the room.
+    /// Drops what is in the gripper: the thing, the weight, and an object of the room.
     pub fn drop_thing(&mut self) {
         self.world.iter_mut().for_each(|world| world.tear_off());
         self.set_thing(None);
         self.set_load(0);
     }
 
-    /// Pushes a joint by hand with a torque in millinewton metres, towards greater angles, until it is set to 0.
+    /// Pushes a joint by hand with a torque in millinewton metres, until the torque is set to 0. Positive values are towards
+    /// greater angles.
     pub fn push(&mut self, joint: Joint, torque: i16) {
         let micronewton_metres = i64::from(torque.clamp(-STRONGEST_PUSH, STRONGEST_PUSH)) * 1_000;
         let torque = AngleScale::of(joint).torque_towards_counts(micronewton_metres);

@@ -1,19 +1,19 @@
-//! The controller and the servos' electronics in another simulation: that one moves the joints.
+//! Joints that another simulation moves, while this one simulates the controller and the electronics of the servos.
 //!
 //! ```text
 //!   set-points, torque switches ──▶ MuJoCo, or another simulation of the arm and what it touches
 //!   positions, velocities, loads ◀──┘
 //! ```
 //!
-//! Such a joint meets what is in the other simulation. Its weight, walls and hands in this one, and faults that block a servo,
-//! have no effect on it. Everything else has: alarms, heat, the supply, and all faults of the servo bus.
+//! Such a joint meets what is in the other simulation. The weight, walls and hands of this simulation, and faults that block a
+//! servo, have no effect on it. Alarms, heat, the supply and all faults of the servo bus still act on it.
 
 use protocol_core::registers::Joint;
 
 use super::Plant;
 use super::pose::AngleScale;
 
-/// The state of a joint in another simulation. The offsets of registers 13 to 19 are not in it.
+/// The state of a joint in another simulation. The angle does not include the offset of registers 13 to 19.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct OutsideState {
     /// In thousandths of a degree.
@@ -25,8 +25,8 @@ pub struct OutsideState {
 }
 
 impl Plant {
-    /// Tells what another simulation measured of a joint now. It moves the joint from now on; with `None` this one does again.
-    /// Until the next call the joint goes on at this velocity.
+    /// Sets the present state of a joint from another simulation, which moves the joint from now on. With `None` this simulation
+    /// moves the joint again. Until the next call the joint goes on at the velocity of this one.
     pub fn measure(&mut self, joint: Joint, state: Option<OutsideState>) {
         let scale = AngleScale::of(joint);
         let Some(servo) = self.servo_mut(joint) else { return };
@@ -40,7 +40,7 @@ impl Plant {
         servo.measure(scale.position(angle.into()), moved, load);
     }
 
-    /// The angle that a servo's control aims at, in thousandths of a degree. It goes to the goal at the goal's speed.
+    /// The angle that a servo's control aims at, in thousandths of a degree. It moves to the goal at the speed of the goal.
     #[must_use]
     pub fn set_point(&self, joint: Joint) -> i32 {
         let set_point = self.servo(joint).map_or(0, |servo| AngleScale::of(joint).angle(servo.set_point()));
@@ -101,7 +101,7 @@ mod tests {
         assert!((before - 80_000).abs() < 200, "{before}");
         assert_eq!(arm.plant().torque(JOINT), Some(Torque::On));
         assert!((arm.plant().angle(JOINT) - 65_000).abs() < 2);
-        // It falls behind at once when this simulation moves it again.
+        // The joint goes to its set-point when this simulation moves it again.
         arm.plant_mut().measure(JOINT, None);
         arm.advance(Duration::from_millis(1_000));
         assert!((arm.plant().angle(JOINT) - 80_000).abs() < 1_500);

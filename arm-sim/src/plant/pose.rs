@@ -6,10 +6,10 @@ use protocol_core::registers::{JOINTS, Joint};
 use super::sine::{cosine, sine};
 use crate::servo::units::COUNT;
 
-/// For either kind of servo, the angle of this many counts is a whole number of thousandths of a degree.
+/// For both kinds of servo, this many counts are a whole number of thousandths of a degree.
 const SPAN: u16 = 850;
 
-/// How positions of a joint's servo become angles, and back.
+/// Converts positions of a joint's servo to angles of the joint, and back.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct AngleScale {
@@ -36,17 +36,18 @@ impl AngleScale {
         self.distance(angle - self.first)
     }
 
-    /// The distance of a servo in millionths of a count, for one of the joint in thousandths of a degree.
+    /// Converts a distance of the joint in thousandths of a degree to a distance of its servo in millionths of a count.
     pub(crate) fn distance(self, angle: i64) -> i64 {
         (angle * i64::from(SPAN) * COUNT).checked_div(self.span).unwrap_or(0)
     }
 
-    /// A torque in millinewton metres for each degree, in micronewton metres for each count.
+    /// Converts a stiffness from millinewton metres per degree to micronewton metres per count.
     pub(crate) fn torque_per_count(self, torque_per_degree: i64) -> i64 {
         torque_per_degree * self.span.abs() / i64::from(SPAN)
     }
 
-    /// A torque towards greater angles, towards more counts; and back.
+    /// Converts a torque that is positive towards greater angles to one that is positive towards more counts. The same
+    /// conversion goes back.
     pub(crate) const fn torque_towards_counts(self, torque: i64) -> i64 {
         if self.span < 0 { -torque } else { torque }
     }
@@ -67,7 +68,7 @@ impl SineAndCosine {
         Self { millidegrees, sin: sine(millidegrees), cos: cosine(millidegrees) }
     }
 
-    /// Changes the angle. Returns whether it is another one.
+    /// Sets the angle. Returns whether it has changed.
     fn turn_to(&mut self, millidegrees: i64) -> bool {
         let has_turned = millidegrees != self.millidegrees;
         if has_turned {
@@ -95,7 +96,7 @@ pub(crate) struct JointSines {
 const LEVEL: i64 = 65_000;
 
 impl JointSines {
-    /// Of the angles of the joints in thousandths of a degree.
+    /// From the angles of the joints in thousandths of a degree.
     pub(crate) const fn of([_, rear, forearm, roll, pitch, _, _]: [i64; JOINTS]) -> Self {
         Self {
             rear: SineAndCosine::of(rear),
@@ -105,7 +106,7 @@ impl JointSines {
         }
     }
 
-    /// Turns the joints to these angles. Returns whether any part has another direction.
+    /// Turns the joints to these angles. Returns whether the direction of any part has changed.
     pub(crate) fn turn_to(&mut self, [_, rear, forearm, roll, pitch, _, _]: [i64; JOINTS]) -> bool {
         let turned = [
             self.rear.turn_to(rear),

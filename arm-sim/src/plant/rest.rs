@@ -1,4 +1,4 @@
-//! Servos at rest: their steps change nothing but sums and counts, so that they are simulated all at once, when the rest ends.
+//! Servos at rest. Their steps change only sums and counts, so all of them are simulated at once when the rest ends.
 
 use protocol_core::time::Instant;
 
@@ -9,9 +9,9 @@ use crate::servo::units::STEP;
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Rest {
-    /// The end of the step before the first one.
+    /// The end of the last step before the rest.
     since: Instant,
-    /// The end of the last one.
+    /// The end of the last step of the rest.
     until: Instant,
     /// The supply voltage in these steps.
     decivolts: u8,
@@ -26,7 +26,7 @@ impl Rest {
         Self { since: now, until: servo.rest_until(now, decivolts), decivolts }
     }
 
-    /// The end of the last step with this supply voltage; in the past if there is none.
+    /// The end of the rest at this supply voltage; a time in the past if the servo does not rest at this voltage.
     pub(super) fn until(self, decivolts: u8) -> Instant {
         if decivolts == self.decivolts { self.until } else { Instant::ZERO }
     }

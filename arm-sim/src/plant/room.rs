@@ -7,7 +7,7 @@ use crate::scene::Scene;
 use crate::world::{ArmInWorld, Effect, Object, World};
 
 impl Plant {
-    /// Puts a scene on the table round the arm, or takes it away. What the arm carried is gone.
+    /// Puts a scene on the table round the arm, or removes it. The arm loses what it carries.
     pub fn set_scene(&mut self, scene: Option<Scene>) {
         self.leave_room();
         self.world = scene.map(|scene| Box::new(World::new(scene)));
@@ -25,7 +25,7 @@ impl Plant {
         self.world().map_or(&[], World::objects)
     }
 
-    /// Lets the suction cup of a scene suck, or let go.
+    /// Sets whether the suction cup of a scene sucks.
     pub const fn set_sucking(&mut self, is_sucking: bool) {
         self.is_sucking = is_sucking;
         self.rest_until = self.now;
@@ -58,8 +58,7 @@ impl Plant {
 
     fn apply(&mut self, &Effect { torques, claw_stop, load_g }: &Effect) {
         self.set_contacts(torques);
-        // Claws that hold something keep what they hold: its angle is that of the moment when they closed. What a person put
-        // between them stays there, too.
+        // Claws that hold an object keep the angle at which they closed on it. A thing that a person put between them stays, too.
         let is_held = self.is_thing_gripped && load_g != 0;
         let is_of_a_person = self.has_thing() && self.room_stop.is_none();
         let stop = claw_stop.map(millidegrees);

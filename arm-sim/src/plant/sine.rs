@@ -1,4 +1,4 @@
-//! Sine in integers. It has the same value on every machine, unlike the sine of a system library.
+//! Sine in integers. Unlike the sine of a system library, it has the same value on every machine.
 
 /// The value that stands for 1 in results of [`sine`].
 pub(crate) const ONE: i64 = 1_000_000;

@@ -8,7 +8,7 @@ use super::{Plant, inertia, weight};
 use crate::servo::Servo;
 use crate::servo::units::STEP;
 
-/// If no call comes for longer than this, the arm stands still during the time before.
+/// After a pause between calls that is longer than this, only the last part of the pause, of this length, is simulated.
 const LONGEST_CATCH_UP: Duration = Duration::from_millis(100_000);
 
 impl Plant {
@@ -54,12 +54,12 @@ impl Plant {
         self.follow_in_room();
     }
 
-    /// The arm after a step in which these joints turned.
+    /// Updates the arm after a step in which these joints turned.
     fn follow(&mut self, [_, shoulder, elbow, roll, pitch, _, claw]: [bool; JOINTS]) {
         if claw {
             self.follow_claw();
         }
-        // The others carry no weight, and change no inertia.
+        // Joints 1, 6 and 7 carry no weight, and change no inertia.
         if shoulder || elbow || roll || pitch {
             self.update_weight();
         } else {
@@ -67,7 +67,7 @@ impl Plant {
         }
     }
 
-    /// Lets the whole steps until `end` pass, which is not after `self.rest_until`.
+    /// Skips the whole steps up to `end`, which must not be after `self.rest_until`.
     fn pass(&mut self, end: Instant) {
         let steps = (end - self.now).as_micros() / STEP.as_micros();
         self.now = self.now + Duration::from_micros(STEP.as_micros() * steps);
@@ -122,7 +122,7 @@ mod tests {
     use crate::faults::ArmFault;
     use crate::{Joint, Simulation};
 
-    /// What an arm did that moves among faults, if its servos are woken every `period` milliseconds.
+    /// The state and the faults of an arm after motion under faults, if the rest of its servos ends every `period` milliseconds.
     fn run(period: u64) -> String {
         let mut arm = Simulation::default();
         let faults = ["2=wall=100", "7=push=20", "1=stuck", "4=restarting=700", "supply=dips=900"];

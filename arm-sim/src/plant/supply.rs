@@ -12,7 +12,7 @@ use crate::servo::units::STEP;
 const NOMINAL_DECIVOLTS: u16 = 74;
 /// The voltage drop for each servo with full load, in 0.1 V. Assumed.
 const DROP_DECIVOLTS: u16 = 3;
-/// The voltage during a dip, in 0.1 V. Each servo restarts. Assumed, as its duration.
+/// The voltage during a dip, in 0.1 V: low enough to restart each servo. Assumed, like the duration.
 const DIP_DECIVOLTS: u16 = 30;
 /// The duration of a dip.
 const DIP: Duration = Duration::from_millis(20);
@@ -23,13 +23,13 @@ const DIP: Duration = Duration::from_millis(20);
 pub enum SupplyFault {
     /// The voltage without load, in 0.1 V.
     Volts(u8),
-    /// Each time this has passed, the voltage falls to 3 V for 20 ms, and all servos restart.
+    /// Once in each period of this length the voltage falls to 3 V for 20 ms, and all servos restart.
     Dips(Duration),
     /// No voltage.
     Off,
 }
 
-/// A word that names no fault of the supply.
+/// The word is not a fault of the supply.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("use supply=volts=VOLTS with 0.0 to 7.4, supply=dips=MILLISECONDS with 100 or more, or supply=off")]
 pub struct UnknownSupplyFault;
@@ -124,7 +124,7 @@ impl Supply {
         }
     }
 
-    /// Until when the voltage without load does not change.
+    /// The time until which the voltage without load does not change.
     pub(super) fn steady_until(&self, now: Instant) -> Instant {
         let Some(SupplyFault::Dips(period)) = self.fault else { return Instant::FAR_FUTURE };
         if self.is_in_dip || self.is_dip(now, period) {
@@ -136,14 +136,14 @@ impl Supply {
         Instant::from_micros(next.as_micros().saturating_sub(STEP.as_micros()))
     }
 
-    /// Counts a frame that a servo answered, or would have answered with power.
+    /// Counts a valid frame on the bus, during a fault of the voltage.
     pub(super) const fn count_frame(&mut self) {
         if matches!(self.fault, Some(SupplyFault::Volts(_) | SupplyFault::Off)) {
             self.count.count(true);
         }
     }
 
-    /// How often the fault took effect: for `Dips` the number of dips, otherwise that of the frames counted above.
+    /// How often the fault took effect: the number of dips for `Dips`, otherwise of frames.
     pub(super) const fn count(&self) -> FaultCount {
         self.count
     }

@@ -24,26 +24,26 @@ use crate::parameters::{
 /// The heaviest weight in the gripper, in grams.
 pub const HEAVIEST_LOAD_G: u16 = 1_000;
 
-/// The weight of a gram in micronewton. Grams times millimetres times this are nanonewton metres.
+/// The weight of a gram, in micronewtons. Grams times millimetres times this are nanonewton metres.
 const GRAVITY: i64 = 9_807;
 
-/// Sum of mass times distance, in gram millimetres: about joint 2, along the rear arm.
+/// Sum of mass times distance about joint 2, along the rear arm, in gram millimetres.
 const SHOULDER: i64 = REAR_ARM_G * REAR_ARM_CENTRE_MM + (FOREARM_G + TOOL_G) * REAR_ARM_MM;
-/// About joint 3, along the forearm.
+/// The same sum about joint 3, along the forearm.
 const FOREARM: i64 = FOREARM_G * FOREARM_CENTRE_MM + TOOL_G * FOREARM_CENTI_MM / 100;
-/// About joint 3, at a right angle to the forearm.
+/// The same sum about joint 3, at a right angle to the forearm.
 const ELBOW: i64 = (FOREARM_G + TOOL_G) * ELBOW_OFFSET_MM;
-/// About joints 3, 4 and 5, along the tool.
+/// The same sum about joints 3, 4 and 5, along the tool.
 const TOOL: i64 = TOOL_G * TOOL_CENTRE_MM;
-/// The torque of gravity on each joint, in micronewton metres, towards greater angles, with this weight in the gripper in
-/// grams.
+/// The torque of gravity on each joint in micronewton metres, positive towards greater angles. `load_g` is the weight in the
+/// gripper in grams.
 pub(crate) fn torques(pose: JointSines, load_g: i64) -> [i64; JOINTS] {
     let JointSines { rear, drop, roll, pitch } = pose;
     let shoulder = SHOULDER + load_g * REAR_ARM_MM;
     let forearm = FOREARM + load_g * FOREARM_CENTI_MM / 100;
     let elbow = ELBOW + load_g * ELBOW_OFFSET_MM;
     let tool = TOOL + load_g * GRIP_MM;
-    // Each is a derivative of the height of the masses.
+    // Each torque is a derivative of the potential energy of the masses.
     let along = forearm * drop.cos + elbow * drop.sin;
     let tool_at_elbow = pitch.sin * drop.cos + pitch.cos * roll.sin / ONE * drop.sin;
     let tool_at_pitch = pitch.cos * drop.sin + pitch.sin * roll.sin / ONE * drop.cos;
@@ -75,7 +75,7 @@ mod tests {
         [90_000, rear * 1_000, forearm * 1_000, roll * 1_000, pitch * 1_000, 90_000, 80_000]
     }
 
-    /// The potential energy in floating point. The torques are its derivatives.
+    /// The potential energy in joules, in floating point. The torques are its derivatives.
     fn energy(pose: [i64; JOINTS], load_kg: f64) -> f64 {
         let radians = |millidegrees: i64| (millidegrees as f64 / 1_000.0).to_radians();
         let [_, rear, forearm, roll, pitch, _, _] = pose.map(radians);

@@ -1,9 +1,9 @@
 //! The wire of the servo bus: when each byte arrives.
 //!
 //! A servo drives the line until some time after its last stop bit. A frame of the master that overlaps with this time is
-//! lost, and it damages the bytes of the servo that it overlaps with. Two frames of the master cannot overlap: the second
-//! one waits for the first. Servos that send at the same time are received one after the other, so collisions between
-//! servos are not simulated. The content of the bytes does not matter here.
+//! lost. If it overlaps with bytes of the servo, it damages all of the servo's bytes that have not arrived yet. Two frames of
+//! the master cannot overlap: the second one waits for the first. Servos that send at the same time are received one after
+//! the other, so collisions between servos are not simulated. This module does not interpret the bytes.
 
 use alloc::collections::VecDeque;
 use alloc::vec::Vec;
@@ -38,17 +38,17 @@ pub(crate) struct Wire {
     /// In bits per second.
     baud: u32,
     byte_time: ByteTime,
-    /// In the order of the starts.
+    /// Ordered by start.
     queue: VecDeque<FrameOnWire>,
-    /// What the last call of [`Wire::take`] returned.
+    /// The bytes that the last call of [`Wire::take`] returned.
     arrived: Vec<u8>,
-    /// Memory for the next transmission.
+    /// The memory of an earlier transmission, for the next one.
     spare: Vec<u8>,
     /// The end of the last byte to the master.
     free_at: Instant,
     /// The end of the last byte from the master.
     master_done_at: Instant,
-    /// The servo that sent last drives the line until then.
+    /// The servo that sent last drives the line until this time.
     driven_until: Instant,
 }
 
@@ -79,8 +79,8 @@ impl Wire {
         (start, self.master_done_at)
     }
 
-    /// Returns whether bytes of the master from `begin` to `end` collide with a servo. If so, the rest of the servo's
-    /// bytes is damaged.
+    /// Returns whether bytes of the master from `begin` to `end` collide with a servo. If they overlap with the servo's bytes,
+    /// those that have not arrived yet are damaged.
     pub(crate) fn collide(&mut self, begin: Instant, end: Instant) -> bool {
         let mut has_collided = begin < self.driven_until;
         let mut free_at = self.free_at;
@@ -103,7 +103,7 @@ impl Wire {
         self.insert(start, bytes.iter().copied(), true);
     }
 
-    /// Lets the master receive its own bytes, from `start` on; damaged if they collided.
+    /// Lets the master receive its own bytes from `start` on. They are damaged if they collided.
     pub(crate) fn echo(&mut self, start: Instant, bytes: &[u8], has_collided: bool) {
         let damage = if has_collided { DAMAGE } else { 0 };
         self.insert(start, bytes.iter().map(|byte| byte ^ damage), false);

@@ -1,9 +1,9 @@
-//! What differs from one make of servo to another.
+//! The properties that differ between makes of servos.
 
 use motion_core::servo_bus::TorqueCodes;
 use protocol_core::time::Duration;
 
-/// The make of a servo.
+/// The properties of a make of servo.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ServoConfig {

@@ -12,19 +12,20 @@ use protocol_core::time::Duration;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum ServoFault {
-    /// It has no power: it executes no frame, sends no answer and drives nothing. When the fault is removed, it starts.
+    /// The servo has no power: it executes no frame, sends no answer and drives nothing. When the fault is removed, it starts.
     Missing,
-    /// Its answers are this much later than usual.
+    /// The servo's answers are this much later than usual.
     Late(Duration),
-    /// Every n-th of its answers has a wrong checksum; 1 means all of them.
+    /// Every n-th answer of the servo has a wrong checksum; 1 means all of them.
     Garbled(u32),
-    /// Something keeps it from turning.
+    /// Something keeps the servo from turning.
     Stuck,
-    /// It restarts each time this has passed: torque and goal are lost, and it executes no frame for 200 ms.
+    /// The servo restarts once in each period of this length: torque and goal are lost, and it executes no frame for
+    /// [`ServoConfig::boot_time`](super::ServoConfig::boot_time), by default 200 ms.
     Restarting(Duration),
 }
 
-/// A word that names no fault.
+/// The word is not a fault of a servo.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "unknown fault '{0}': use missing, late, late=MILLISECONDS, garbled, garbled=EVERY_NTH, \

@@ -1,4 +1,4 @@
-//! The fault of a servo while it runs: what it does to answers, when it restarts the servo, and how often it took effect.
+//! The fault of a running servo: its effect on answers, when it restarts the servo, and how often it took effect.
 
 use motion_core::servo_bus::frame::ServoFrameBuffer;
 use protocol_core::time::{Duration, Instant};
@@ -32,14 +32,14 @@ impl FaultState {
         }
     }
 
-    /// Sets or removes the fault at `now`. The count begins again.
+    /// Sets or removes the fault at `now`, and resets the count.
     pub(super) fn set(&mut self, now: Instant, fault: Option<ServoFault>) {
         self.fault = fault;
         self.count = FaultCount::default();
         self.plan_restart(now);
     }
 
-    /// The servo starts.
+    /// Resets the number of answers at a start of the servo.
     pub(super) const fn start(&mut self) {
         self.answers = 0;
     }
@@ -51,7 +51,7 @@ impl FaultState {
         };
     }
 
-    /// Does the servo restart at `now`?
+    /// Does the fault restart the servo at `now`? If so, counts the restart and plans the next one.
     pub(super) fn takes_restart(&mut self, now: Instant) -> bool {
         let is_due = now >= self.restarts_at;
         if is_due {
@@ -74,21 +74,21 @@ impl FaultState {
         self.fault == Some(ServoFault::Stuck)
     }
 
-    /// Counts a frame to the servo.
+    /// Counts a frame to the servo while it is missing.
     pub(super) fn count_frame(&mut self) {
         if self.is_missing() {
             self.count.count(true);
         }
     }
 
-    /// Counts steps of a millisecond. `would_turn` tells that the servo would turn if it were not stuck.
+    /// Counts steps of a millisecond while the servo is stuck. `would_turn`: without the fault it would turn.
     pub(super) fn count_steps(&mut self, steps: u32, would_turn: bool) {
         if self.is_stuck() {
             self.count.count_many(steps.into(), would_turn);
         }
     }
 
-    /// Damages an answer. Returns how much later than usual it is sent.
+    /// Applies the fault to an answer. Returns how much later than usual the answer is sent.
     pub(super) fn inject(&mut self, bytes: &mut ServoFrameBuffer) -> Duration {
         self.answers = self.answers.wrapping_add(1);
         match self.fault {

@@ -1,8 +1,8 @@
 //! The gear of a simulated servo: friction, inertia and drag, and the speed that a torque gives a joint.
 //!
-//! A joint at rest turns when the torque exceeds the static friction. A joint that turns loses the sliding friction.
-//! Both grow by a share of the torque from outside. Friction stops a joint exactly, so that a
-//! joint comes to rest. The step is semi-implicit: no drag and no friction makes it unstable. The values are in
+//! A joint at rest turns when the torque exceeds the static friction. Sliding friction reduces the torque on a joint that turns.
+//! Both grow by a share of the torque from outside. Friction reduces a low speed to exactly 0, so that a joint comes to rest.
+//! The step is semi-implicit, so it is stable with any drag and any friction. The values are in
 //! [`parameters`](crate::parameters), all integers.
 
 use super::units::COUNT_PER_SECOND;
@@ -11,12 +11,12 @@ use crate::parameters::{CREEP_COUNTS_PER_SECOND, LOAD_FRICTION_PERCENT, ServoPar
 /// Below this speed, in millionths of a count per step, a joint has static friction.
 const CREEP: i64 = CREEP_COUNTS_PER_SECOND * COUNT_PER_SECOND;
 
-/// The torques on a joint in a step, in micronewton metres, towards more counts.
+/// The torques on a joint in a step, in micronewton metres, positive towards more counts.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Torques {
-    /// Of the motor.
+    /// The torque of the motor.
     pub(super) motor: i64,
-    /// From outside the servo.
+    /// The torque from outside the servo.
     pub(super) outside: i64,
 }
 
@@ -42,7 +42,7 @@ impl Gear {
         torques.net().abs() <= self.0.static_friction + torques.load_friction()
     }
 
-    /// The greatest torque that a motor has to hold against the torque from outside, with all friction against it.
+    /// The greatest torque that the motor needs against the torque from outside, if all friction acts against the motor.
     pub(super) const fn highest_load(self, torques: Torques) -> i64 {
         torques.outside.abs() + self.0.static_friction + torques.load_friction()
     }
@@ -53,8 +53,9 @@ impl Gear {
         if speed == 0 && self.holds(torques) {
             return 0;
         }
-        // A torque in micronewton metres by an inertia in gram square millimetres is the change of speed in a
-        // millisecond in radians per second. A drag, likewise, is the share of the speed that is lost in a millisecond.
+        // A torque in micronewton metres divided by an inertia in gram square millimetres is the change of speed in a
+        // millisecond, in radians per second. A drag divided by an inertia is the share of the speed that is lost in a
+        // millisecond.
         let inertia = self.0.rotor_inertia + inertia;
         let momentum = speed * inertia + torques.net() * self.0.counts_per_kiloradian;
         let own = if speed.abs() < CREEP { self.0.static_friction } else { self.0.sliding_friction };

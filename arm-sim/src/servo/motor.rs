@@ -7,13 +7,13 @@
 //! ```
 //!
 //! Control is proportional, with a derivative term: `duty = (error + D × change of the error) / 4.3 degrees`, from
-//! -1 to 1. The motor is voltage-driven: `torque = stall torque × (duty - speed / 372 degrees per second)`. So droop,
-//! load (register 60, the duty) and following error belong together: a joint that carries half the stall torque is about
+//! -1 to 1. The motor is voltage-driven: `torque = stall torque × (duty - speed / 372 degrees per second)`. So droop and
+//! following error are proportional to the load (register 60, the duty): a joint that carries half the stall torque is about
 //! 2 degrees off its set-point.
 //!
 //! Without torque, the weight turns the joint against friction and drag, to the mechanical ends of the servo at 0 and
-//! 1023 counts. All values are integers and all steps are equal, so a run does not depend on how often its caller looks.
-//! There are no frames here.
+//! 1023 counts. All values are integers and all steps are equal, so the motion does not depend on how often the simulation is
+//! polled. There are no frames here.
 
 use motion_core::servo_bus::Reading;
 use protocol_core::registers::Joint;
@@ -28,19 +28,19 @@ use crate::parameters::{DERIVATIVE_FILTER_MS, FULL_DUTY_ERROR, NO_LOAD_SPEED, Se
 const END: i64 = Reading::MAX_POSITION as i64 * COUNT;
 /// Thousandths of a degree in a radian.
 const MILLIDEGREES_PER_RADIAN: i64 = 57_296;
-/// The duty at which the motor gets the whole voltage.
+/// The value of a duty of 1, at which the motor gets the whole voltage.
 const FULL_DUTY: i64 = 1_000_000;
 
-/// A motor with its gear and its position sensor.
+/// A motor with its gear and its position sensor. Positions, distances and errors are in millionths of a count.
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Motor {
     gear: Gear,
-    /// The distance of a step at full speed without load.
+    /// The distance in a step at full speed without load.
     no_load_distance: i64,
     /// The error for full duty.
     full_error: i64,
-    /// The drag of the driven motor by its own voltage, in micronewton metre seconds per radian.
+    /// The drag of the driven motor by its back EMF, in micronewton metre seconds per radian.
     back_emf: i64,
     pub(crate) surroundings: Surroundings,
     position: i64,
@@ -49,35 +49,35 @@ pub(crate) struct Motor {
     /// The position that the control aims at in this step.
     set_point: i64,
     target: i64,
-    /// The distance of the set-point in a step.
+    /// How far the set-point moves in a step.
     rate: i64,
     /// The distance that the motor turned in the last step.
     moved: i64,
     /// The distance between set-point and position in the last step.
     error: i64,
-    /// The filtered change of the error in a step.
+    /// The filtered change of the error per step.
     error_change: i64,
     /// In millionths. Positive values are towards more counts.
     duty: i64,
     /// The torque in the last step, in 0.1 % of the stall torque.
     torque: i16,
-    /// Another simulation moves it: see [`Self::measure`].
+    /// Another simulation moves the joint: see [`Self::measure`].
     is_outside: bool,
 }
 
-/// What acts on a motor in a step, besides its surroundings.
+/// What determines the motion of a motor in a step, besides its surroundings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) enum MotorMode {
-    /// Something outside the servo holds it in place.
+    /// Something outside the servo holds the joint in place.
     Held,
     /// The drag of the gear.
     Free,
     /// The drag of the gear, and of the motor with its windings shorted.
     Damped,
-    /// Its control.
+    /// The position control.
     Driven,
-    /// Its control, but something keeps it from turning.
+    /// The position control, but something keeps the joint from turning.
     Blocked,
 }
 
@@ -117,7 +117,7 @@ impl Motor {
         }
     }
 
-    /// Gives it another gear and another strength. Its control and its speed stay.
+    /// Changes the stall torque, the friction and the drag. The position control and the speed without load stay the same.
     pub(crate) fn set_parameters(&mut self, parameters: &ServoParameters) {
         self.gear = Gear(*parameters);
         self.back_emf = back_emf(parameters, self.no_load_distance);
@@ -136,7 +136,7 @@ impl Motor {
         self.rate = rate.min(self.no_load_distance);
     }
 
-    /// Is this the goal of the last move?
+    /// Does the last move go to the position of this goal?
     pub(crate) fn is_started(&self, goal: Goal) -> bool {
         self.target == i64::from(goal.position_counts) * COUNT
     }
@@ -172,7 +172,7 @@ impl Motor {
         }
     }
 
-    /// A step in which another simulation moves the joint: from its last measurement on at the same speed.
+    /// A step in which another simulation moves the joint: it goes on from the last measurement at the measured speed.
     fn step_outside(&mut self) {
         self.position = (self.position + self.moved).clamp(0, END);
         if self.mode.is_controlled() {
@@ -183,8 +183,8 @@ impl Motor {
         self.torque = self.torque_in_step();
     }
 
-    /// Another simulation moves the joint from now on, and measured this: the position, the distance in a step, and the duty in
-    /// millionths.
+    /// Lets another simulation move the joint from now on. The arguments are its measurements: the position, the distance in a
+    /// step, and the duty in millionths.
     pub(crate) fn measure(&mut self, position: i64, moved: i64, duty: i64) {
         self.is_outside = true;
         self.position = position.clamp(0, END);
@@ -205,7 +205,7 @@ impl Motor {
         self.set_point += (self.target - self.set_point).clamp(-self.rate, self.rate);
     }
 
-    /// Moves the set-point on, and sets the duty.
+    /// Moves the set-point towards the target, and sets the duty.
     fn control(&mut self) {
         self.advance_set_point();
         let error = self.set_point - self.position;
@@ -226,18 +226,18 @@ impl Motor {
         self.gear.speed_after(self.moved, self.torques(), drag, self.surroundings.inertia)
     }
 
-    /// The torques at standstill.
+    /// The torques that would act at standstill: the back EMF is part of the drag.
     fn torques(&self) -> Torques {
         let motor = self.gear.0.stall_torque * self.duty / FULL_DUTY;
         Torques { motor, outside: self.surroundings.torque(self.position) }
     }
 
-    /// The positions that it can reach from here.
+    /// The range of positions that the joint can reach from here.
     fn range(&self) -> (i64, i64) {
         self.surroundings.range(self.position, (0, END))
     }
 
-    /// Turns it from outside.
+    /// Turns the joint by hand to a position in counts.
     pub(crate) fn turn_to(&mut self, position_counts: u16) {
         self.position = i64::from(position_counts.min(Reading::MAX_POSITION)) * COUNT;
         self.moved = 0;
@@ -259,12 +259,12 @@ impl Motor {
         i16::try_from(self.moved / COUNT_PER_SECOND).unwrap_or(0)
     }
 
-    /// The load in 0.1 %: its duty. Positive values are towards more counts.
+    /// The load in 0.1 %, which is the duty. Positive values are towards more counts.
     pub(crate) fn load(&self) -> i16 {
         i16::try_from(self.duty * 1_000 / FULL_DUTY).unwrap_or(0)
     }
 
-    /// The torque of the motor in 0.1 % of its stall torque: the duty without what the speed needs.
+    /// The torque of the motor in 0.1 % of its stall torque: the duty less the part that the speed needs.
     pub(crate) const fn torque(&self) -> i16 {
         self.torque
     }
@@ -280,23 +280,23 @@ impl Motor {
         i16::try_from((self.duty - for_speed) * 1_000 / FULL_DUTY).unwrap_or(0)
     }
 
-    /// How far its load from outside turns it off its set-point at most, in thousandths of a degree. `None`: the load
-    /// exceeds the stall torque.
+    /// The greatest distance of the joint from its set-point under its present external load, in thousandths of a degree.
+    /// `None`: the load exceeds the stall torque.
     pub(crate) fn droop(&self) -> Option<i64> {
         let load = self.gear.highest_load(self.torques());
         (load < self.gear.0.stall_torque).then_some(FULL_DUTY_ERROR * load / self.gear.0.stall_torque.max(1))
     }
 
-    /// The distance in which its stall torque stops it, in thousandths of a degree.
+    /// The distance in which the stall torque would stop the joint from its present speed, in thousandths of a degree.
     pub(crate) fn stopping_distance(&self) -> i64 {
         let milliradians_per_second = self.moved * 1_000 / self.gear.0.counts_per_kiloradian.max(1);
-        // Half the inertia in gram square millimetres by the square of the speed is the energy in femtojoules.
+        // Half the inertia in gram square millimetres, times the square of this speed, is the energy in femtojoules.
         let inertia = self.gear.0.rotor_inertia + self.surroundings.inertia;
         let energy = inertia / 1_000 * milliradians_per_second * milliradians_per_second / 2;
         energy / self.gear.0.stall_torque.max(1) * MILLIDEGREES_PER_RADIAN / 1_000_000
     }
 
-    /// Does a step in this mode change nothing?
+    /// Would a step in this mode change nothing?
     pub(crate) fn is_at_rest(&self, mode: MotorMode) -> bool {
         mode == self.mode
             && !self.is_outside
@@ -306,7 +306,7 @@ impl Motor {
             && (mode.is_held() || self.is_balanced())
     }
 
-    /// Do friction, an obstacle or a mechanical end hold it against all torques?
+    /// Does friction, an obstacle or a mechanical end hold the joint against all torques?
     pub(crate) fn is_balanced(&self) -> bool {
         let torques = self.torques();
         let (low, high) = self.range();
@@ -324,7 +324,7 @@ impl Motor {
     }
 }
 
-/// The drag of a driven motor by its own voltage, in micronewton metre seconds per radian.
+/// The drag of a driven motor by its back EMF, in micronewton metre seconds per radian.
 fn back_emf(parameters: &ServoParameters, no_load_distance: i64) -> i64 {
     parameters.stall_torque * parameters.counts_per_kiloradian / no_load_distance.max(1)
 }

@@ -1,4 +1,4 @@
-//! What a joint meets outside its servo, and alarms that are forced on it.
+//! The obstacles of a joint, and alarms that are forced on its servo.
 
 use super::Servo;
 use super::surroundings::{Side, Surface};
@@ -8,44 +8,45 @@ use crate::fault_count::FaultCount;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Trip {
-    /// It latches an overload.
+    /// The servo latches an overload.
     Overload,
-    /// It is 5 degrees Celsius hotter than its limit, and cools down.
+    /// The servo is 5 degrees Celsius hotter than its limit, and cools down.
     Heat,
 }
 
-/// A forced heat exceeds the limit by this, in degrees Celsius.
+/// [`Trip::Heat`] exceeds the temperature limit by this, in degrees Celsius.
 const EXCESS_CELSIUS: u8 = 5;
 
 impl Servo {
-    /// Sets the arm's torque in micronewton metres, towards more counts, and its inertia in gram square millimetres.
+    /// Sets the torque of the arm's weight in micronewton metres, positive towards more counts, and the inertia of the arm in
+    /// gram square millimetres.
     pub(crate) const fn set_arm(&mut self, weight: i64, inertia: i64) {
         self.motor.surroundings.weight = weight;
         self.motor.surroundings.inertia = inertia;
     }
 
-    /// The arm's torque. Its inertia has no effect on a joint at rest.
+    /// The torque of the arm's weight. The inertia is not needed to end a rest: it has no effect on a joint at rest.
     pub(crate) const fn weight(&self) -> i64 {
         self.motor.surroundings.weight
     }
 
-    /// Sets the torque of what the arm touches in its room, in micronewton metres, towards more counts.
+    /// Sets the torque of the arm's contacts in its room, in micronewton metres, positive towards more counts.
     pub(crate) const fn set_contact(&mut self, torque: i64) {
         self.motor.surroundings.contact = torque;
     }
 
-    /// That torque.
+    /// The torque of the arm's contacts in its room, as [`Servo::set_contact`] sets it.
     pub(crate) const fn contact(&self) -> i64 {
         self.motor.surroundings.contact
     }
 
-    /// Sets or takes away the wall. A wall counts the milliseconds in which the joint touches it.
+    /// Sets or removes the wall, and resets the count of the milliseconds in which the joint touched it.
     pub(crate) fn set_wall(&mut self, wall: Option<Surface>) {
         self.motor.surroundings.wall = wall;
         self.wall_count = FaultCount::default();
     }
 
-    /// Sets or takes away what is between the claws.
+    /// Sets or removes the thing between the claws. A new thing resets the count; a removed one keeps it.
     pub(crate) fn set_thing(&mut self, thing: Option<Surface>) {
         self.motor.surroundings.thing = thing;
         if thing.is_some() {
@@ -53,23 +54,23 @@ impl Servo {
         }
     }
 
-    /// What is between the claws.
+    /// The thing between the claws.
     pub(crate) const fn thing(&self) -> Option<Surface> {
         self.motor.surroundings.thing
     }
 
-    /// Sets the torque of a hand in micronewton metres, towards more counts.
+    /// Sets the torque of a hand in micronewton metres, positive towards more counts. Resets its count.
     pub(crate) fn push(&mut self, torque: i64) {
         self.motor.surroundings.push = torque;
         self.push_count = FaultCount::default();
     }
 
-    /// Milliseconds in which it touched its wall, touched the thing between the claws, or was pushed.
+    /// The milliseconds in which the joint touched its wall, touched the thing between the claws, and was pushed.
     pub(crate) const fn obstacle_counts(&self) -> [FaultCount; 3] {
         [self.wall_count, self.thing_count, self.push_count]
     }
 
-    /// The side at which an obstacle at this position is.
+    /// The side of the joint on which an obstacle at this position is.
     pub(crate) const fn side_of(&self, position: i64) -> Side {
         if self.motor.position() <= position { Side::MoreCounts } else { Side::FewerCounts }
     }

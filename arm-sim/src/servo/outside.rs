@@ -3,8 +3,8 @@
 use super::Servo;
 
 impl Servo {
-    /// Another simulation moves the joint, and measured this: the position in millionths of a count, the distance in a step, and
-    /// the load in 0.1 %.
+    /// Lets another simulation move the joint from now on. The arguments are its measurements: the position in millionths of a
+    /// count, the distance in a step, and the load in 0.1 %.
     pub(crate) fn measure(&mut self, position: i64, moved: i64, load: i16) {
         self.update_reading();
         self.motor.measure(position, moved, i64::from(load) * 1_000);
@@ -15,7 +15,7 @@ impl Servo {
         self.motor.move_inside();
     }
 
-    /// The position that its control aims at, in millionths of a count.
+    /// The position that the control aims at, in millionths of a count.
     pub(crate) const fn set_point(&self) -> i64 {
         self.motor.set_point()
     }

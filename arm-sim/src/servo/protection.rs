@@ -2,14 +2,14 @@
 //!
 //! | alarm | begins | ends |
 //! | --- | --- | --- |
-//! | overload | the torque was above 80 % of the stall torque for a second | torque is switched off and on |
-//! | heat | the temperature is above register 13 | it is not |
-//! | voltage | the supply is outside registers 15 to 14 | it is not |
+//! | overload | the torque was above 80 % of the stall torque for a second | torque is switched off |
+//! | heat | the temperature is above register 13 | the temperature is at most register 13 |
+//! | voltage | the supply is outside registers 15 to 14 | the supply is within registers 15 to 14 |
 //!
 //! Each alarm is an error bit in every answer. Register 19 tells which alarms switch the motor off; the factory setting is
-//! all three. The torque switch (register 40) keeps its value: when heat or voltage end, torque comes back by itself.
+//! all three. The torque switch (register 40) keeps its value: when a heat or voltage alarm ends, torque comes back by itself.
 //!
-//! The torque is the duty without the share that the speed needs. So a fast motion without load is no overload.
+//! The torque is the duty less the part that the speed needs. So a fast motion without load is no overload.
 
 use motion_core::servo_bus::frame::error;
 
@@ -45,7 +45,7 @@ impl Protection {
         torque.unsigned_abs() > OVERLOAD
     }
 
-    /// A step in which nothing changes and the torque is no overload.
+    /// Records a step in which nothing changes and the torque is no overload.
     pub(super) const fn rest(&mut self) {
         self.overload_steps = 0;
     }

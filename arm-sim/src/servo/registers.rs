@@ -1,7 +1,7 @@
 //! The registers of a simulated servo: executes the instructions of frames and encodes the answers.
 //!
-//! The motor gets its goal from here and writes its measurements back. There is no time here: the caller decides when an
-//! answer is sent.
+//! The motor gets its goal from here, and its measurements are written back here. There is no time here: the caller decides
+//! when an answer is sent.
 
 mod memory;
 
@@ -58,7 +58,7 @@ impl ServoRegisters {
         id
     }
 
-    /// The baud rate in bits per second. An invalid code counts as 0.
+    /// The baud rate in bits per second. An invalid code counts as code 0, 1 Mbaud.
     pub(super) fn baud(&self) -> u32 {
         let [code] = self.field(register::BAUD_RATE);
         BAUD_RATES.get(usize::from(code)).copied().unwrap_or(1_000_000)
@@ -71,9 +71,9 @@ impl ServoRegisters {
 
     /// Executes a frame that is addressed to this servo, and returns the answer if there is one.
     ///
-    /// A write is acknowledged if register 8 is 1. A broadcast, an unknown instruction and a range beyond register 70
+    /// A write is acknowledged if register 8 is not 0. A broadcast, an unknown instruction and a range beyond register 70
     /// have no answer. The acknowledgement of a write that changes the id carries the new id; Feetech's tables do not
-    /// say which of the two a real servo sends.
+    /// say whether a real servo sends the old or the new one.
     pub(super) fn handle_frame(&mut self, frame: &ServoFrame<'_>) -> Option<ServoFrameBuffer> {
         let is_addressed = frame.id == self.id();
         if !is_addressed && frame.id != BROADCAST {
@@ -118,7 +118,7 @@ impl ServoRegisters {
         let written = start..start + data.len();
         let is_locked = self.field(register::LOCK) != [0];
         let slots = self.registers.get_mut(written.clone())?;
-        // Most goals are those that the servo holds.
+        // Most writes repeat the goal that the servo already holds.
         if slots != data {
             for ((slot, &byte), address) in slots.iter_mut().zip(data).zip(register..) {
                 if is_writable(address, is_locked) && !(address == register::ID && byte > MAX_ID) {
@@ -148,7 +148,8 @@ impl ServoRegisters {
         items.find(|(first, _)| **first == id).map(|(_, data)| data)
     }
 
-    /// Do the registers hold the values of a sync write already? Such a frame may start a move.
+    /// Do the registers already hold the values of a sync write? Such a frame can still start a move, if the motor has not
+    /// started one to this goal.
     pub(super) fn holds(&self, frame: &ServoFrame<'_>) -> bool {
         match (Instruction::from_code(frame.code), frame.params) {
             (Some(Instruction::SyncWrite), [register, width, items @ ..]) => {
@@ -158,13 +159,13 @@ impl ServoRegisters {
         }
     }
 
-    /// The code in the torque switch. Its meaning is a setting of the arm.
+    /// The code in the torque switch. [`ServoConfig::torque_codes`](super::ServoConfig::torque_codes) defines its meaning.
     pub(super) fn torque_switch(&self) -> u8 {
         let [code] = self.field(register::TORQUE_SWITCH);
         code
     }
 
-    /// Sets the code in the torque switch, as no frame did.
+    /// Sets the code in the torque switch without a frame: [`ServoRegisters::is_torque_written`] does not change.
     pub(super) fn set_torque_switch(&mut self, code: u8) {
         self.set_field(register::TORQUE_SWITCH, [code]);
     }

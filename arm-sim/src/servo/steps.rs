@@ -32,7 +32,7 @@ impl Servo {
         before != self.motor.position()
     }
 
-    /// Loses power below the brown-out voltage, and starts when the voltage returns.
+    /// Switches the servo off below the brown-out voltage, and starts it when the voltage returns.
     fn follow_supply(&mut self, now: Instant, supply_decivolts: u8) {
         let has_supply = self.ready_at != Instant::FAR_FUTURE;
         if supply_decivolts < BROWN_OUT_DECIVOLTS && has_supply {
@@ -42,14 +42,14 @@ impl Servo {
         }
     }
 
-    /// Does a step in this mode, with this supply voltage, change nothing?
+    /// Would a step in this mode, with this supply voltage, change nothing?
     fn is_at_rest(&self, mode: MotorMode, supply_decivolts: u8) -> bool {
         let is_steady = self.motor.is_at_rest(mode) && !Protection::is_overload(self.motor.torque());
         is_steady && self.reported == Some(self.report(supply_decivolts))
     }
 
-    /// After the step that ended at `now`: until when steps with this supply voltage change nothing, if no call changes
-    /// the servo. [`Servo::rest`] then replaces them.
+    /// The time until which steps with this supply voltage change nothing, if no call changes the servo. Call it after the step
+    /// that ended at `now`. [`Servo::rest`] replaces these steps.
     pub(crate) fn rest_until(&self, now: Instant, supply_decivolts: u8) -> Instant {
         if !self.is_at_rest(self.motor_mode(now), supply_decivolts) {
             return now;
@@ -60,7 +60,7 @@ impl Servo {
         Instant::from_micros(event.min(heating))
     }
 
-    /// Simulates steps that change nothing.
+    /// Simulates steps that change nothing but sums and counts.
     pub(crate) fn rest(&mut self, steps: u32) {
         self.temperature.steps(self.motor.torque(), steps);
         self.count_obstacles(steps);
@@ -89,7 +89,7 @@ impl Servo {
         }
     }
 
-    /// Would it turn if it were not stuck?
+    /// Would the joint turn if it were not stuck?
     fn would_turn(&self) -> bool {
         let is_held = !self.has_torque() && (self.is_held || self.is_supported);
         !is_held && !self.motor.is_balanced()
@@ -117,7 +117,7 @@ impl Servo {
         Reported { decivolts, celsius, errors }
     }
 
-    /// Begins and ends alarms. When an alarm ends that switched the motor off, the motor moves to the stored goal.
+    /// Begins and ends alarms. When an alarm that switched the motor off ends, the motor moves to the stored goal.
     fn update_errors(&mut self, errors: u8) {
         self.registers.set_errors(errors);
         if self.protection.unload(errors, self.registers.limits()) && self.is_on {
@@ -133,8 +133,8 @@ impl Servo {
         self.update_errors(reported.errors);
     }
 
-    /// Writes the measurements of the last step that changed any into the registers. Call it before anything but a step changes
-    /// the motor.
+    /// Writes the latest measurements into the registers, if they are not there yet. Call it before the motor is changed outside
+    /// a step.
     pub(super) fn update_reading(&mut self) {
         let Some(reported) = self.reported.filter(|_| self.is_reading_old) else { return };
         self.is_reading_old = false;

@@ -1,7 +1,7 @@
 //! What acts on a joint from outside its servo: the arm's weight and inertia, a hand that pushes, and obstacles.
 //!
-//! Positions are in millionths of a count and torques in micronewton metres, towards more counts. There are no angles
-//! here.
+//! Positions are in millionths of a count. Torques are in micronewton metres, positive towards more counts. There are no
+//! angles here.
 
 use super::units::COUNT;
 
@@ -27,7 +27,7 @@ pub(crate) struct Surface {
 }
 
 impl Surface {
-    /// How far a joint at this position presses into it. Not positive: the joint does not touch it.
+    /// How far a joint at this position presses into the surface. Negative: the joint does not touch it.
     const fn depth(&self, position: i64) -> i64 {
         match self.side {
             Side::MoreCounts => position - self.position,
@@ -44,11 +44,11 @@ impl Surface {
         }
     }
 
-    /// The range of positions that a joint can reach from here, of this range.
+    /// Limits a range of positions to those that a joint at `from` can reach.
     fn bound(&self, from: i64, (low, high): (i64, i64)) -> (i64, i64) {
         match (self.stiffness, self.side) {
             (Some(_), _) => (low, high),
-            // A joint that is behind the surface already gets no deeper.
+            // A joint that is already behind the surface cannot go deeper.
             (None, Side::MoreCounts) => (low, high.min(self.position.max(from))),
             (None, Side::FewerCounts) => (low.max(self.position.min(from)), high),
         }
@@ -70,15 +70,15 @@ pub(crate) struct Surroundings {
     pub(crate) inertia: i64,
     /// The torque of a hand.
     pub(crate) push: i64,
-    /// The torque of what the arm touches in its room.
+    /// The torque of the arm's contacts in its room.
     pub(crate) contact: i64,
     pub(crate) wall: Option<Surface>,
-    /// What is between the claws. Only joint 7 has it.
+    /// The thing between the claws. Only joint 7 has it.
     pub(crate) thing: Option<Surface>,
 }
 
 impl Surroundings {
-    /// Is there an obstacle, or a hand?
+    /// Is there a wall, a thing between the claws, or a hand that pushes?
     pub(crate) const fn has_contact(&self) -> bool {
         self.wall.is_some() || self.thing.is_some() || self.push != 0
     }
@@ -87,13 +87,13 @@ impl Surroundings {
         [&self.wall, &self.thing].into_iter().flatten()
     }
 
-    /// The torque on a joint at this position. Stiff obstacles are in [`Surroundings::range`] instead.
+    /// The torque on a joint at this position. Stiff obstacles have none: they limit [`Surroundings::range`] instead.
     pub(crate) fn torque(&self, position: i64) -> i64 {
         let obstacles: i64 = self.obstacles().map(|obstacle| obstacle.torque(position)).sum();
         self.weight + self.push + self.contact + obstacles
     }
 
-    /// The range of positions that a joint can reach from here, of this range.
+    /// Limits a range of positions to those that a joint at `from` can reach.
     pub(crate) fn range(&self, from: i64, range: (i64, i64)) -> (i64, i64) {
         self.obstacles().fold(range, |range, obstacle| obstacle.bound(from, range))
     }

@@ -1,7 +1,8 @@
-//! The temperature of a simulated servo: its windings heat it by the square of the torque, and it follows slowly.
+//! The temperature of a simulated servo. The heat of its windings grows with the square of the torque, and the temperature
+//! follows with a time constant.
 //!
-//! A servo that is stalled at full duty exceeds 80 degrees after 99 s. One that holds 40 % reaches 57 degrees and stays
-//! there. The values are in [`parameters`](crate::parameters).
+//! A servo that is stalled at full duty shows more than 80 degrees after 99 s. One that holds 40 % shows 56 degrees and stays
+//! there: 57 less the rounding of the updates. The values are in [`parameters`](crate::parameters).
 
 use crate::parameters::{AMBIENT_MILLIDEGREES, STALL_RISE_MILLIDEGREES, THERMAL_TIME};
 
@@ -30,12 +31,12 @@ impl Default for Temperature {
 }
 
 impl Temperature {
-    /// How many steps the temperature certainly stays the same.
+    /// Number of next steps in which the temperature cannot change.
     pub(super) const fn steps_to_update(self) -> u32 {
         UPDATE_STEPS.saturating_sub(self.steps + 1)
     }
 
-    /// Adds steps with this torque, in 0.1 % of the stall torque. Several at once must not be more than
+    /// Adds `count` steps with this torque, in 0.1 % of the stall torque. A `count` above 1 must not exceed
     /// [`Temperature::steps_to_update`].
     pub(super) fn steps(&mut self, torque: i16, count: u32) {
         let torque = u64::from(torque.unsigned_abs());
@@ -50,7 +51,7 @@ impl Temperature {
         *self = Self { millidegrees, squares: 0, steps: 0 };
     }
 
-    /// Sets it from outside.
+    /// Sets the temperature, for a forced alarm.
     pub(super) fn set(&mut self, celsius: u8) {
         self.millidegrees = u64::from(celsius) * 1_000;
     }

@@ -1,4 +1,4 @@
-//! The first two lines of a session: what kind of arm it was.
+//! The first two lines of a session: the kind of arm and its initial state.
 
 use alloc::string::String;
 use alloc::vec::Vec;
@@ -12,26 +12,27 @@ use crate::simulation::SimulationConfig;
 /// Which controller the arm has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ControllerKind {
-    /// This project's.
+    /// The controller of this project.
     Sevenbot,
-    /// The maker's, [`StockController`](crate::stock_controller::StockController).
+    /// The maker's controller, [`StockController`](crate::stock_controller::StockController).
     Maker,
 }
 
-/// What kind of arm it was, and where it started.
+/// The kind of the recorded arm, and its initial state.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SessionHeader {
-    /// The version of the program that recorded.
+    /// The version of the program that recorded the session.
     pub program: String,
-    /// Its controller.
+    /// The controller of the arm.
     pub controller: ControllerKind,
-    /// What the faults of the host line are drawn from.
+    /// The seed of the random faults of the host line.
     pub seed: u64,
-    /// Its chip id, most significant byte first.
+    /// The chip id of the arm, most significant byte first.
     pub chip_id: [u8; 6],
     /// Do bytes on the host line take the time that the baud rate requires?
     pub is_paced: bool,
-    /// Does each byte arrive at its own time, instead of in batches?
+    /// Does each byte on the host line have its own deadline? See
+    /// [`SimulatedArm::set_bytewise_line`](crate::simulated_arm::SimulatedArm::set_bytewise_line).
     pub is_bytewise: bool,
     /// The meaning of the codes in the servos' torque switch.
     pub torque_codes: TorqueCodes,
@@ -76,10 +77,10 @@ impl Display for SessionHeader {
     }
 }
 
-/// Why the first two lines are no start of a session.
+/// Why the first two lines are not the header of a session.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum HeaderError {
-    /// The file is something else.
+    /// The text is not a session of this version of the format.
     #[error(
         "it does not begin with '7bot-session {VERSION}', as what `host-sim --record` writes. `sevenbot sniff FILE` shows \
          a log of `sevenbot log` or `--log`"
@@ -94,7 +95,7 @@ impl SessionHeader {
     /// Parses the first two lines.
     ///
     /// # Errors
-    /// The lines are of something else or another version, or a value is missing or wrong.
+    /// The lines are not the header of a session of this version, or a value is missing or wrong.
     pub fn parse(first: &str, second: &str) -> Result<Self, HeaderError> {
         let mut words = first.split(' ');
         let is_ours = words.next() == Some("7bot-session")

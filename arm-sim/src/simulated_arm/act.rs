@@ -12,7 +12,7 @@ use crate::faults::FaultReport;
 use crate::plant::Plant;
 
 impl<F: NorFlash, C: ArmController> SimulatedArm<F, Plant, C> {
-    /// Does something to the arm at `now`. Returns the reports of the faults that this ended.
+    /// Carries out an action at `now`. Returns the reports of the faults that it ended.
     pub fn act(&mut self, now: Instant, action: Action) -> Vec<FaultReport> {
         match action {
             Action::Disconnect => {
@@ -47,7 +47,7 @@ impl<F: NorFlash, C: ArmController> SimulatedArm<F, Plant, C> {
     }
 }
 
-/// Carries out an action on the simulated servos and what is round them. The others are for the controller or the lines.
+/// Carries out the actions on the simulated servos and their surroundings. [`SimulatedArm::act`] handles all others.
 fn act_on_plant(plant: &mut Plant, action: Action) {
     match action {
         Action::Hand(joint, counts) => plant.move_by_hand(joint, counts),

@@ -1,4 +1,4 @@
-//! When something happens next.
+//! When the next event of an arm is.
 
 use embedded_storage::nor_flash::NorFlash;
 use protocol_core::time::{Duration, Instant};
@@ -7,8 +7,8 @@ use super::SimulatedArm;
 use crate::controller::ArmController;
 use crate::servo_bus::ServoBus;
 
-/// A deadline that stays in the past is checked again after this. Wake-ups without bytes on the host line are at
-/// multiples of it, so that many arms wake up together.
+/// A deadline that stays in the past is checked again after this time. Wake-ups without bytes on the host line are at
+/// multiples of this time, so that many arms wake up together.
 const TICK: Duration = Duration::from_millis(1);
 /// Without a client the next wake-up may be this much later, because no client sees the difference.
 const TICK_WITHOUT_CLIENT: Duration = Duration::from_millis(50);

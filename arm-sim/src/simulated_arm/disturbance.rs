@@ -1,4 +1,4 @@
-//! What disturbs an arm while it runs: faults, each until it is taken back or its time is over, and the power switch.
+//! Faults of a running arm, each until it is removed or its time is over, and a drop of what the gripper holds.
 
 use alloc::vec::Vec;
 
@@ -24,7 +24,7 @@ impl<F: NorFlash, C: ArmController> SimulatedArm<F, Plant, C> {
         &self.controller
     }
 
-    /// Draws the faults of the host line from this seed from now on. By default it is 1.
+    /// Sets the seed of the random faults of the host line, 1 by default. The bytes on the host line are lost.
     pub fn set_seed(&mut self, seed: u64) {
         self.record_action(self.now, Action::Seed(seed));
         (self.to_arm, self.to_host) = LineDirection::pair(seed);
@@ -37,15 +37,15 @@ impl<F: NorFlash, C: ArmController> SimulatedArm<F, Plant, C> {
         }
     }
 
-    /// Makes each byte on the host line an event. Then results do not depend on whether the host sends two frames at once,
-    /// or the second one as soon as the first one has arrived. [`SimulatedArm::set_seed`] ends it.
+    /// Gives each byte on the host line its own deadline. Then results do not depend on whether the host sends two frames at
+    /// once, or the second one as soon as the first one has arrived. [`SimulatedArm::set_seed`] ends it.
     pub const fn set_bytewise_line(&mut self) {
         self.to_arm.set_bytewise();
         self.to_host.set_bytewise();
     }
 
-    /// Gives the arm a fault at `now`, for a time or until [`SimulatedArm::end_faults`]. Returns the report of the fault
-    /// that it replaces.
+    /// Adds a fault at `now`, for `duration` or until [`SimulatedArm::end_faults`]. Returns the report of the fault that it
+    /// replaces.
     pub fn set_fault(
         &mut self,
         now: Instant,
@@ -70,7 +70,7 @@ impl<F: NorFlash, C: ArmController> SimulatedArm<F, Plant, C> {
         replaced
     }
 
-    /// Takes the faults at a location back at `now`, or all faults. Returns how often they took effect.
+    /// Removes the faults at a location at `now`, or all faults with `None`. Returns their reports.
     pub fn end_faults(&mut self, now: Instant, location: Option<FaultLocation>) -> Vec<FaultReport> {
         self.record_action(now, Action::Clear(location));
         self.simulate(now, false);
@@ -89,7 +89,7 @@ impl<F: NorFlash, C: ArmController> SimulatedArm<F, Plant, C> {
         ended
     }
 
-    /// The faults of the arm.
+    /// The faults of the arm, and how often they took effect so far.
     pub fn faults(&mut self) -> Vec<FaultReport> {
         let listed: Vec<ListedFault> = self.faults.iter().collect();
         listed.into_iter().map(|listed| self.report(listed)).collect()
@@ -112,7 +112,7 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
     /// Ends the faults whose time is over, and a thing between the claws that was dropped.
     pub(super) fn end_due_faults(&mut self) {
         if self.faults.has_thing() && self.bus.plant_mut().is_some_and(|plant| !plant.has_thing()) {
-            // The claws opened and dropped it.
+            // The claws opened and dropped the thing.
             for listed in self.faults.take_things() {
                 let report = self.end(listed);
                 self.ended_faults.push(report);
@@ -127,7 +127,7 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
         }
     }
 
-    /// The state of the storage, with its fault.
+    /// The state of the settings storage, with [`FlashFault::Full`] applied.
     pub(super) fn storage(&self) -> Storage {
         let is_full = self.faults.contains(ArmFault::Flash(FlashFault::Full));
         if is_full { Storage::Full } else { self.settings.storage() }

@@ -27,7 +27,7 @@ impl<F: NorFlash, C: ArmController> SimulatedArm<F, Plant, C> {
         !self.is_off
     }
 
-    /// Does the controller hang, since [`SimulatedArm::halt_controller`]?
+    /// Does the controller hang, after [`SimulatedArm::halt_controller`]?
     #[must_use]
     pub const fn is_halted(&self) -> bool {
         self.is_halted && !self.is_off
@@ -51,7 +51,7 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
         self.start_controller(now, fault::WATCHDOG_RESTART);
     }
 
-    /// Stops the controller at `now`, as a program that hangs. It sends and receives nothing until
+    /// Stops the controller at `now`, as if its program hung. It sends and receives nothing until
     /// [`SimulatedArm::restart_controller`] or [`SimulatedArm::power_cycle`]. The servos keep their goals.
     pub fn halt_controller(&mut self, now: Instant) {
         self.record_action(now, Action::HaltController);

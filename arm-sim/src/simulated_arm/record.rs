@@ -1,4 +1,4 @@
-//! What is recorded of an arm: see [`crate::session`].
+//! Records the session of an arm: see [`crate::session`].
 
 use alloc::boxed::Box;
 
@@ -11,7 +11,7 @@ use crate::tap::Watcher;
 
 impl<F, B, C> SimulatedArm<F, B, C> {
     /// Passes everything that is done to the arm from outside, and the bytes that the host takes, to `recorder` from now
-    /// on. What is done to the plant by [`SimulatedArm::plant_mut`] is not recorded: use [`SimulatedArm::act`].
+    /// on. Changes by [`SimulatedArm::plant_mut`] are not recorded: use [`SimulatedArm::act`].
     pub fn set_recorder(&mut self, recorder: impl SessionRecorder + 'static) {
         self.recorder = Watcher::holding(Box::new(recorder));
     }

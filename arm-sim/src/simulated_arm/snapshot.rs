@@ -1,4 +1,4 @@
-//! Sets an arm back to an earlier copy of it.
+//! Restores an arm to an earlier copy of it.
 
 use alloc::vec;
 
@@ -7,11 +7,12 @@ use embedded_storage::nor_flash::NorFlash;
 use super::SimulatedArm;
 
 impl<F: NorFlash + Clone, B: Clone, C: Clone> SimulatedArm<F, B, C> {
-    /// Makes the arm what `snapshot`, an earlier copy of it, was: also its time, its faults and the bytes on the host line.
-    /// It keeps its tap and its recorder. The settings are programmed again if they differ, so that a file has them, too.
+    /// Restores the state of `snapshot`, an earlier copy of the arm, with its time, its faults and the bytes on the host line.
+    /// The tap and the recorder stay. Settings that differ are programmed into the flash again, so that a settings file gets
+    /// them, too.
     ///
     /// # Errors
-    /// The settings cannot be read or programmed. The arm is unchanged, and the cells of its flash may be erased.
+    /// The settings cannot be read or programmed. The arm itself is unchanged then, but its flash may be erased.
     pub fn restore(&mut self, snapshot: &Self) -> Result<(), F::Error> {
         let mut copy = snapshot.clone();
         program(&mut self.settings.flash_mut().flash, &mut copy.settings.flash_mut().flash)?;
@@ -21,14 +22,14 @@ impl<F: NorFlash + Clone, B: Clone, C: Clone> SimulatedArm<F, B, C> {
         Ok(())
     }
 
-    /// Is everything that is done to the arm recorded?
+    /// Does the arm have a recorder?
     #[must_use]
     pub const fn is_recorded(&self) -> bool {
         !self.recorder.is_empty()
     }
 }
 
-/// Programs the content of `wanted` into `flash`, unless it is there.
+/// Programs the content of `wanted` into `flash`, unless `flash` already has it.
 fn program<F: NorFlash>(flash: &mut F, wanted: &mut F) -> Result<(), F::Error> {
     let mut bytes = vec![0; flash.capacity()];
     let mut present = bytes.clone();

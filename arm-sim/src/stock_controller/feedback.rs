@@ -16,7 +16,7 @@ impl Default for Feedback {
 }
 
 impl Feedback {
-    /// Starts the stream: the first frame at once, the next ones after more than 1000 ms / `hertz`. 0 ends it.
+    /// Starts the stream: the first frame at once, the next ones each 1000 ms / `hertz`, rounded down, plus 1 ms. 0 ends it.
     pub(super) fn set_frequency(&mut self, now: Instant, hertz: u8) {
         match 1_000_u64.checked_div(u64::from(hertz)) {
             Some(millis) => *self = Self { period: Duration::from_millis(millis + 1), due: now },

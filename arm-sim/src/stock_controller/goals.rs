@@ -1,4 +1,4 @@
-//! The last target of each joint, and how fast it moves to the next one.
+//! The last target of each joint, and the speed and time of its next goal.
 
 use alloc::vec::Vec;
 
@@ -9,7 +9,7 @@ use protocol_core::registers::{JOINTS, Joint};
 use super::registers::StockRegisters;
 use super::servo_master::ServoGoal;
 
-/// Speed, in counts per second, and time of the goals after the move at start.
+/// Speed in counts per second, and time, of the first goals after the move at start.
 const SPEED_AT_START: u16 = 600;
 const TIME_AT_START_MS: u16 = 1_000;
 /// A unit of the speed registers in counts per second, and of the time registers in milliseconds.
@@ -22,7 +22,7 @@ pub(super) struct LastGoals([LastGoal; JOINTS]);
 
 #[derive(Clone, Copy, Debug)]
 struct LastGoal {
-    /// In degrees. A target that is equal is not sent again.
+    /// In degrees. An equal target is not sent again.
     target: u8,
     /// In counts per second.
     speed: u16,
@@ -34,7 +34,7 @@ impl LastGoals {
         Self(targets.map(|target| LastGoal { target, speed: SPEED_AT_START, time_ms: TIME_AT_START_MS }))
     }
 
-    /// All targets, to be reached within this time.
+    /// The goals of all joints for their last targets, to be reached within this time.
     pub(super) fn within(&self, time_ms: u16, registers: &StockRegisters) -> Vec<(Joint, ServoGoal)> {
         let goals = Joint::ALL.into_iter().zip(self.0);
         goals.map(|(joint, goal)| LastGoal { speed: 0, time_ms, ..goal }.of_servo(joint, registers)).collect()

@@ -1,7 +1,7 @@
 //! When and with which registers the maker's firmware solves inverse kinematics.
 //!
-//! A solution is exact here; the maker's firmware truncates it to whole degrees, as this file does, and refuses or misses
-//! some poses that this solver reaches.
+//! The solver here is exact. Its angles are truncated to whole degrees, as in the maker's firmware. That firmware refuses or
+//! misses some poses that this solver reaches.
 
 use kinematics::{ik5, ik6, ik7};
 use motion_core::reach::{direction, position};
@@ -18,7 +18,7 @@ pub(super) enum Solver {
     Ik7,
 }
 
-/// The solvers that writes have asked for.
+/// The solvers that writes have requested.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Requested {
     ik5: bool,
@@ -27,7 +27,7 @@ pub(super) struct Requested {
 }
 
 impl Requested {
-    /// Notes the registers of a write. One byte of a block is enough.
+    /// Requests the solvers whose registers were written. One byte of a block is enough.
     pub(super) fn note(&mut self, is_written: impl Fn(u8) -> bool) {
         let any = |row: &Register| (0..row.count).any(|index| is_written(row.address + index));
         self.ik5 |= any(&WRIST_POSITION);
@@ -35,7 +35,7 @@ impl Requested {
         self.ik7 |= any(&DISC_DIRECTION);
     }
 
-    /// The solvers to run after a write. IK7 leaves the request for IK6 to the next write, as the maker's firmware does.
+    /// The solvers to run after a write. With IK7, a request for IK6 stays until the next write, as in the maker's firmware.
     pub(super) fn take(&mut self) -> impl Iterator<Item = Solver> + use<> {
         let ik5 = core::mem::take(&mut self.ik5).then_some(Solver::Ik5);
         let other = if core::mem::take(&mut self.ik7) {
@@ -63,7 +63,7 @@ impl Solver {
         }
     }
 
-    /// The type of the alarm without a solution. IK5 fails silently.
+    /// The type of the alarm if there is no solution. `None`: IK5 fails silently.
     pub(super) const fn alarm(self) -> Option<u8> {
         match self {
             Self::Ik5 => None,
@@ -73,7 +73,7 @@ impl Solver {
     }
 }
 
-/// Whole degrees, truncated. The joints that are not solved keep their targets.
+/// Whole degrees, truncated. `None`: the solver has no angle for this joint, which keeps its target.
 fn targets(angles: &[f32]) -> [Option<u8>; JOINTS] {
     let mut targets = [None; JOINTS];
     for (target, &angle) in targets.iter_mut().zip(angles) {

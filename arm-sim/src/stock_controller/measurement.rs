@@ -8,7 +8,7 @@ use protocol_core::registers::{Joint, Register};
 /// Servos that are read one after the other, before a frame is sent.
 #[derive(Clone, Debug)]
 pub(super) struct Measurement {
-    /// The frame is a report: the host did not ask for it.
+    /// The frame is a report, which the host did not request.
     pub(super) is_report: bool,
     pub(super) first: u8,
     pub(super) count: u8,
@@ -19,7 +19,7 @@ pub(super) struct Measurement {
 }
 
 impl Measurement {
-    /// The reply to a read. StockRegisters 83 to 89 and 91 to 97 are measured now.
+    /// The reply to a read. Registers 83 to 89 and 91 to 97 are measured first.
     pub(super) fn reply(first: u8, count: u8) -> Self {
         let is_read = |address: u8| address.checked_sub(first).is_some_and(|index| index < count);
         let is_measured =

@@ -1,13 +1,13 @@
-//! The controller of an arm as the maker ships it: firmware 2.1.4 on the maker's ESP32 board, with map 2.1 only.
+//! The controller of an arm as the maker delivers it: firmware 2.1.4 on the maker's ESP32 board, with map 2.1 only.
 //!
 //! ```text
 //!   host ──▶ Parser ──▶ StockRegisters ──▶ ServoMaster ──▶ servos
 //!   host ◀── frames ◀── StockRegisters ◀── ServoMaster ◀── servos
 //! ```
 //!
-//! It is there to test host programs against: it checks no range, refuses nothing, has no status block, sends text
-//! between its frames, and does nothing while it beeps. The move to the standard pose at start and the timeout of a servo are
-//! assumed. Its WebSocket, its buttons and the defects of its inverse kinematics are not simulated.
+//! It exists to test host programs: it checks no range, refuses nothing, has no status block, sends text between its
+//! frames, and does nothing else while it beeps. The move to the standard pose at start and the timeout of a servo are
+//! assumed. The WebSocket, the buttons and the defects of the maker's inverse kinematics are not simulated.
 
 mod feedback;
 mod goals;
@@ -43,7 +43,7 @@ use parser::{Parser, StockRequest};
 use registers::StockRegisters;
 use servo_master::{ReadOutcome, ServoMaster};
 
-/// The arm obeys nothing before this time after power-up. Then it moves to the standard pose.
+/// After power-up the arm executes no request for this long. Then it moves to the standard pose.
 const BOOT_TIME: Duration = Duration::from_millis(500);
 const WAKE_UP_MS: u16 = 2_000;
 /// How long an alarm beeps. The arm does nothing else meanwhile.
@@ -51,7 +51,7 @@ const BEEP: Duration = Duration::from_millis(100);
 const BANNER: &[u8] = b"7Bot V2, firmware 2.1.4\r\n";
 const BEEP_ON: &[u8] = b"Buzzer ON - Note: 2, Freq: 330\r\n";
 const BEEP_OFF: &[u8] = b"Buzzer OFF\r\n";
-/// Bytes from the host that wait while the arm is busy.
+/// The most bytes from the host that wait while the arm is busy.
 const INPUT_BUFFER: usize = 256;
 /// The baud code for 1 Mbaud. All others mean 115,200 baud.
 const FAST: u8 = 3;
@@ -74,9 +74,9 @@ pub struct StockController {
     vacuum: VacuumControl,
     goals: LastGoals,
     requested: Requested,
-    /// The servos get their first goals at this time.
+    /// The servos get their first goals at this time. `None`: they have them.
     wake_up: Option<Instant>,
-    /// The arm beeps until then.
+    /// The arm beeps until this time.
     beep_end: Option<Instant>,
     baud: u32,
 }
@@ -149,7 +149,7 @@ impl ArmController for StockController {
 
     fn set_storage(&mut self, _storage: Storage) {}
 
-    /// The maker's controller continues its feedback.
+    /// No effect: the maker's controller continues its feedback.
     fn host_left(&mut self, _now: Instant) {}
 
     fn baud(&self) -> u32 {
@@ -272,7 +272,7 @@ impl StockController {
         self.solve(now);
     }
 
-    /// Solves the inverse kinematics that were asked for. Only IK6 and IK7 sound an alarm.
+    /// Runs the requested solvers. Only IK6 and IK7 sound an alarm.
     fn solve(&mut self, now: Instant) {
         for solver in self.requested.take() {
             match solver.solve(&self.registers) {

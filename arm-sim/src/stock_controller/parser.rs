@@ -1,4 +1,4 @@
-//! The maker's parser: one state, no timeout, and no second search of damaged bytes.
+//! The maker's parser: one frame at a time, no timeout, and no search for a header in the bytes of a damaged frame.
 
 use alloc::vec::Vec;
 

@@ -14,7 +14,7 @@ use protocol_core::registers::map21::{
     ANGLE_FEEDBACK_FREQUENCY, BUTTON_ENABLE, LOAD_FEEDBACK_FREQUENCY, PRESENT_ANGLE, PRESENT_LOAD,
 };
 
-/// StockRegisters 0 to 99.
+/// Number of registers: 0 to 99.
 const COUNT: usize = 100;
 /// The version in tenths: 2.1.
 const VERSION: u8 = 21;
@@ -28,7 +28,7 @@ const IMAGE_START: u8 = CHIP_ID.address + CHIP_ID.count;
 #[derive(Clone, Debug)]
 pub(super) struct StockRegisters {
     values: [u8; COUNT],
-    /// The offsets act from the next start on.
+    /// The offsets in effect: those that were stored at the start. A written offset acts from the next start on.
     offsets: [i8; JOINTS],
 }
 
@@ -54,7 +54,7 @@ impl StockRegisters {
         registers
     }
 
-    /// The value of a register. StockRegisters past the table read 0; the maker's firmware returns other memory.
+    /// The value of a register. Registers past the table read 0; the maker's firmware returns other memory.
     pub(super) fn get(&self, address: u8) -> u8 {
         self.values.get(usize::from(address)).copied().unwrap_or(0)
     }
@@ -73,7 +73,7 @@ impl StockRegisters {
         (first..=u8::MAX).zip(values).for_each(|(address, &value)| self.set(address, value));
     }
 
-    /// Writes the registers of a frame: addresses 11 to 82 and 90, the others are ignored.
+    /// Writes the registers of a frame. Addresses 11 to 82 and 90 are written, and all others ignored.
     pub(super) fn write(&mut self, first: u8, values: &[u8]) {
         for (address, &value) in (first..=u8::MAX).zip(values) {
             let is_writable = (DEVICE_ID.address..=ANGLE_FEEDBACK_FREQUENCY.address).contains(&address)
@@ -84,7 +84,8 @@ impl StockRegisters {
         }
     }
 
-    /// The values to store after a write: the stored registers that it covers, if the lock is open afterwards.
+    /// The image to store after a write, with the registers that the write covers. `None` if the lock is closed after the write,
+    /// or if nothing has changed.
     pub(super) fn image_after(&self, before: Image, first: u8, count: usize) -> Option<Image> {
         let covered = |address: &u8| usize::from(*address) < usize::from(first) + count && *address >= first;
         let mut image = before;
@@ -102,7 +103,7 @@ impl StockRegisters {
         self.set(PRESENT_LOAD.of(joint), load(reading.load));
     }
 
-    /// The offset of a joint since start, in degrees.
+    /// The offset of a joint in effect, in degrees.
     pub(super) fn offset(&self, joint: Joint) -> i8 {
         self.offsets.get(usize::from(joint.index())).copied().unwrap_or(0)
     }
@@ -134,8 +135,8 @@ fn offset(stored: u8) -> i8 {
     }
 }
 
-/// A load in 0.1 %, as the maker's firmware shows it: 128 + load / 8. It subtracts a servo's word with the sign bit from
-/// 1023, so a negative load becomes one unit greater.
+/// A load in 0.1 %, as the maker's firmware shows it: 128 + load / 8. The firmware subtracts a servo's word with the sign bit
+/// from 1023, so a negative load gets 0.1 % more negative.
 fn load(tenths: i16) -> u8 {
     let tenths = if tenths < 0 { tenths.saturating_sub(1) } else { tenths };
     u8::try_from(128 + tenths / 8).unwrap_or(if tenths < 0 { 0 } else { u8::MAX })

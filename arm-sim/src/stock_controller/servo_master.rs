@@ -26,13 +26,13 @@ pub(super) enum ReadOutcome {
 /// The master of the servo bus.
 #[derive(Clone, Debug)]
 pub(super) struct ServoMaster {
-    /// Frames to send. True: a servo answers.
+    /// Frames to send. `true`: a servo answers the frame.
     queue: VecDeque<(ServoFrameBuffer, bool)>,
     sending: ServoFrameBuffer,
     decoder: Decoder,
     /// The joint whose answer is outstanding.
     asked: Option<Joint>,
-    /// No frame starts before this time. If an answer is outstanding, its timeout.
+    /// No frame starts before this time. While an answer is outstanding, this is its timeout.
     busy_until: Instant,
     byte_time: ByteTime,
     timeout: Duration,
@@ -74,7 +74,7 @@ impl ServoMaster {
         self.queue.push_back((frame, false));
     }
 
-    /// Reads the measurements of a joint's servo. Call it again only after the outcome.
+    /// Reads the measurements of a joint's servo. Call it again only after [`ServoMaster::take_outcome`] returned the outcome.
     pub(super) fn ask(&mut self, joint: Joint) {
         let mut frame = ServoFrameBuffer::new();
         frame::read(&mut frame, joint.index(), register::PRESENT_POSITION, Reading::REGISTERS);
@@ -111,7 +111,7 @@ impl ServoMaster {
         &self.sending
     }
 
-    /// The outcome of the read, once.
+    /// The outcome of the read, returned once. `None`: there is no read, or its answer is outstanding.
     pub(super) fn take_outcome(&mut self, now: Instant) -> Option<ReadOutcome> {
         let joint = self.asked?;
         if !self.queue.is_empty() {
@@ -141,7 +141,7 @@ impl ServoMaster {
         None
     }
 
-    /// When the bus has something to do next.
+    /// When a frame can be sent or a read times out; [`Instant::FAR_FUTURE`] if the bus is idle.
     pub(super) fn deadline(&self) -> Instant {
         let is_idle = self.queue.is_empty() && self.asked.is_none();
         if is_idle { Instant::FAR_FUTURE } else { self.busy_until }

@@ -1,8 +1,8 @@
-//! Where a rigid thing is, and which way it is turned.
+//! The position and the orientation of a rigid body.
 
 use kinematics::{Float, Vector};
 
-/// A point or a direction in mm.
+/// A point in mm, or a direction.
 pub(super) type Point = Vector<f64>;
 
 pub(super) const UP: Point = Vector { x: 0.0, y: 0.0, z: 1.0 };
@@ -22,24 +22,24 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// Upright, and turned to the left by this angle in degrees.
+    /// An upright frame, rotated about z by `turn` degrees, anticlockwise seen from above.
     pub(super) fn upright(origin: Point, turn: f64) -> Self {
         let (sine, cosine) = Float::sin_cos(turn);
         let x = Vector::new(cosine, sine, 0.0);
         Self { origin, x, y: UP.cross(x), z: UP }
     }
 
-    /// A point in its axes, in the frame of the arm.
+    /// Converts a point from this frame to the frame of the arm.
     pub(super) fn point(&self, local: Point) -> Point {
         self.origin + self.direction(local)
     }
 
-    /// A direction in its axes, in the frame of the arm.
+    /// Converts a direction from this frame to the frame of the arm.
     fn direction(&self, Vector { x, y, z }: Point) -> Point {
         self.x * x + self.y * y + self.z * z
     }
 
-    /// A point of the arm's frame, in these axes.
+    /// Converts a point from the frame of the arm to this frame.
     pub(super) fn local(&self, point: Point) -> Point {
         self.local_direction(point - self.origin)
     }
@@ -48,19 +48,19 @@ impl Frame {
         Vector::new(direction.dot(self.x), direction.dot(self.y), direction.dot(self.z))
     }
 
-    /// This frame, seen from another one.
+    /// Converts this frame from the frame of the arm to the frame `other`.
     pub(super) fn seen_from(&self, other: &Self) -> Self {
         let [x, y, z] = [self.x, self.y, self.z].map(|axis| other.local_direction(axis));
         Self { origin: other.local(self.origin), x, y, z }
     }
 
-    /// The frame of which this one was seen from `other`.
+    /// Converts this frame from the frame `other` to the frame of the arm: the inverse of [`Self::seen_from`].
     pub(super) fn carried_by(&self, other: &Self) -> Self {
         let [x, y, z] = [self.x, self.y, self.z].map(|axis| other.direction(axis));
         Self { origin: other.point(self.origin), x, y, z }
     }
 
-    /// How far it is turned to the left, seen from above, in degrees.
+    /// The rotation about the vertical in degrees, anticlockwise seen from above.
     #[must_use]
     pub fn turn(&self) -> f64 {
         Float::atan2(self.x.y, self.x.x)

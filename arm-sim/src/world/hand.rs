@@ -1,4 +1,4 @@
-//! The points of the arm that can touch something, and what a force on one of them does to the joints.
+//! The points of the arm that can touch something, and the torques on the joints by a force on one of them.
 //!
 //! ```text
 //!                       finger ──┐
@@ -6,7 +6,7 @@
 //!                       finger ──┘
 //! ```
 //!
-//! The fingers are those that the picture of the arm shows; each turns by half of the angle of joint 7.
+//! The fingers are those of the drawn model of the arm. Each turns by half of the angle of joint 7.
 
 use kinematics::geometry::{CLAW_MAX, DISC_RADIUS, FINGER_AXIS, FINGER_BEND, FINGER_END};
 use kinematics::{Float, Frames, Vector, forward};
@@ -18,7 +18,7 @@ use crate::scene::Tool;
 const FINGER_RADIUS: f64 = 2.5;
 /// The length of the pads, in mm.
 const PAD: f64 = 12.0;
-/// From the disc to the end of the suction cup, in mm.
+/// Distance from the disc to the end of the suction cup, in mm.
 pub(super) const CUP: f64 = 25.0;
 /// Half the width of the arm's parts at elbow and wrist, in mm.
 const PART_RADIUS: f64 = 15.0;
@@ -28,7 +28,7 @@ const PART_RADIUS: f64 = 15.0;
 pub(super) struct Ball {
     pub(super) point: Point,
     pub(super) radius: f64,
-    /// The joints before it: 2 for the elbow, 3 for the wrist, 6 for the tool.
+    /// Number of joints that move it: 2 for the elbow, 3 for the wrist, 6 for the tool.
     pub(super) joints: usize,
     pub(super) is_finger_end: bool,
 }
@@ -51,12 +51,12 @@ pub(super) struct Hand {
 pub(super) struct Grip {
     /// Its origin is between the pads; x points along the tool, y from one pad to the other.
     pub(super) frame: Frame,
-    /// Between the pads, in mm.
+    /// The distance between the pads, in mm.
     pub(super) gap: f64,
 }
 
 impl Hand {
-    /// At these angles of joints 1 to 7, in degrees.
+    /// The arm with joints 1 to 7 at these angles in degrees.
     pub(super) fn new([t1, t2, t3, t4, t5, t6, t7]: [f64; 7]) -> Self {
         Self { frames: forward([t1, t2, t3, t4, t5, t6]), claw: t7 }
     }
@@ -97,14 +97,15 @@ impl Hand {
         parts.into_iter().chain(edge).chain(tool)
     }
 
-    /// The torques on joints 1 to 6 by a force in N at a point that `joints` joints move, in mN m towards greater angles.
+    /// The torques on joints 1 to 6 by a force in N at a point that the first `joints` joints move. In mN m, positive towards
+    /// greater angles.
     pub(super) fn torques(&self, point: Point, joints: usize, force: Point) -> [f64; 6] {
         let Frames { arm, hand } = &self.frames;
         let about = |axis: Point, centre: Point| axis.cross(point - centre).dot(force);
         let zero = Vector::new(0.0, 0.0, 0.0);
         let mut torques = [
             about(UP, zero),
-            // The parallelogram moves what is behind the elbow without turning it.
+            // The parallelogram moves all parts beyond the elbow without turning them.
             (-arm.left).cross(arm.elbow - arm.shoulder).dot(force),
             about(arm.left, arm.elbow),
             about(-arm.along, arm.wrist),
@@ -116,19 +117,19 @@ impl Hand {
     }
 }
 
-/// A point of a finger, in the axes of the tool: ahead of the disc, and outward, in mm.
+/// Converts a point of a finger to the axes of the tool with the claw at this angle: ahead of the disc, and outward, in mm.
 fn finger_point([ahead, outward]: [f64; 2], claw: f64) -> [f64; 2] {
     let (sine, cosine) = Float::sin_cos(claw / 2.0);
     let [axis_ahead, axis_aside] = FINGER_AXIS;
     [axis_ahead + ahead * cosine - outward * sine, axis_aside + ahead * sine + outward * cosine]
 }
 
-/// Between the pads, in mm, with the ends of the fingers this far from the tool's axis.
+/// The distance between the pads, if the ends of the fingers are this far from the tool's axis. In mm.
 fn gap(aside: f64) -> f64 {
     2.0 * (aside - FINGER_RADIUS)
 }
 
-/// The angle of joint 7 at which this width is between the pads, in degrees. `None`: it is too wide or too narrow.
+/// The angle of joint 7 in degrees at which the pads are this far apart, in mm. `None`: the width is out of reach.
 pub(super) fn angle_for(width: f64) -> Option<f64> {
     let gap_at = |angle| {
         let [_, aside] = finger_point(FINGER_END, angle);

@@ -6,16 +6,16 @@
 //!                             └──▶ an object between the claws or at the cup is carried, and dropped
 //! ```
 //!
-//! It is no simulation of rigid bodies, but what is needed for an arm that sorts and stacks, in steps of a millisecond:
+//! This is not a simulation of rigid bodies. It has only what an arm that sorts and stacks needs, in steps of a millisecond:
 //! - A part of the arm, or what it carries, that touches something is pushed back by 8 N for each mm, at right angles to
 //!   the surface. So the table is an obstacle like any other. There is no friction and no bounce.
 //! - An object that is pushed from the side moves out of the way, with what stands on it, unless a wall stops it. It never
 //!   tips over, and does not turn.
-//! - An object falls until its middle is above something, and stands there upright. What is let go rights itself.
+//! - An object falls until its middle is above something, and stands there upright. An object that is let go turns upright.
 //! - The claws carry an object once they touch it on both sides, however hard they press, until they open. The cup carries
 //!   an object that it touches with the pump on.
 //!
-//! All numbers are `f64`, and only exactly rounded operations are used: all machines get the same bits.
+//! All numbers are `f64`, and only correctly rounded operations are used: all machines get the same bits.
 
 mod frame;
 mod hand;
@@ -33,20 +33,20 @@ use frame::{Point, UP};
 use hand::{Ball, Grip, Hand, angle_for};
 use solid::Solid;
 
-/// The force that pushes back, in N for each mm: such that it is stable with the lightest part of the arm.
+/// The contact force in N for each mm of depth: low enough to be stable with the lightest part of the arm.
 const STIFFNESS: f64 = 8.0;
 /// Claws that are narrower than an object by more than this do not hold it, in mm.
 const PLAY: f64 = 4.0;
-/// The cup carries an object from this distance on, in mm.
+/// The cup takes an object at this distance or nearer, in mm.
 const SUCTION: f64 = 3.0;
 
 /// An object in the room.
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Object {
-    /// Its name, form and weight, and where it was at first.
+    /// Its name, form and weight, and its initial position.
     pub item: Item,
-    /// Where it is: the middle of it, and its axes.
+    /// Its present position: the origin is its middle.
     pub frame: Frame,
     /// Does the arm carry it?
     pub is_carried: bool,
@@ -64,32 +64,32 @@ impl Object {
         self.frame.origin.z + self.solid.half_height()
     }
 
-    /// Is this point above or below it?
+    /// Does the vertical line through this point meet the object?
     fn covers(&self, point: Point) -> bool {
         let at = Vector::new(point.x, point.y, self.frame.origin.z);
         self.solid.touch(&self.frame, at, 0.0).is_some()
     }
 }
 
-/// What the arm does at one time.
+/// The state of the arm in a step of the room.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ArmInWorld {
     /// The true angles of joints 1 to 7, in degrees.
     pub(crate) angles: [f64; JOINTS],
-    /// The claws have touched what is between them, and have not opened since.
+    /// The claws have touched the object between them, and have not opened since.
     pub(crate) is_gripping: bool,
     /// The pump sucks.
     pub(crate) is_sucking: bool,
 }
 
-/// What the room does to the arm.
+/// The effect of the room on the arm.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Effect {
     /// The torques on joints 1 to 6 in mN m, towards greater angles.
     pub(crate) torques: [f64; 6],
-    /// The angle of joint 7 in degrees at which the claws touch what is between them.
+    /// The angle of joint 7 in degrees at which the claws touch the object between them. `None` without an object.
     pub(crate) claw_stop: Option<f64>,
-    /// What the arm carries, in grams.
+    /// The weight of the carried object, in grams.
     pub(crate) load_g: u16,
 }
 
@@ -102,15 +102,15 @@ pub struct World {
     objects: Vec<Object>,
     /// The object between the claws, carried or not.
     between: Option<usize>,
-    /// The carried object, and where it is seen from the tip.
+    /// The carried object, and its frame relative to the tip.
     carried: Option<(usize, Frame)>,
-    /// Something was torn off the cup. It sucks nothing before the pump was off.
+    /// An object was torn off the cup. The cup takes no object until the pump was switched off.
     is_torn_off: bool,
     is_moving: bool,
 }
 
 impl World {
-    /// The room at first.
+    /// The room in its initial state.
     #[must_use]
     pub fn new(scene: Scene) -> Self {
         let table = scene.table;
@@ -143,7 +143,7 @@ impl World {
         self.objects.push(Object { item, frame, is_carried: false, solid, speed: 0.0 });
     }
 
-    /// The scene that it began with.
+    /// The scene with which the room began.
     #[must_use]
     pub const fn scene(&self) -> &Scene {
         &self.scene
@@ -155,12 +155,12 @@ impl World {
         &self.objects
     }
 
-    /// Does something fall, or was it moved in the last step?
+    /// Did an object fall, or was one pushed or dropped, in the last step?
     pub(crate) const fn is_moving(&self) -> bool {
         self.is_moving
     }
 
-    /// A step of a millisecond, after which the arm is in this pose.
+    /// Simulates a millisecond. `arm` is the state of the arm at its end.
     pub(crate) fn step(&mut self, arm: ArmInWorld) -> Effect {
         self.is_moving = false;
         let hand = Hand::new(arm.angles);
@@ -177,7 +177,7 @@ impl World {
         }
     }
 
-    /// Takes, moves and drops what the arm carries.
+    /// Takes, moves or drops the object that the arm carries.
     fn carry(&mut self, hand: &Hand, arm: ArmInWorld) {
         let tip = hand.tip();
         self.is_torn_off &= arm.is_sucking;
@@ -204,7 +204,7 @@ impl World {
         }
     }
 
-    /// What the arm carries falls.
+    /// Drops the object that the arm carries. The cup takes no object until the pump was switched off.
     pub(crate) fn tear_off(&mut self) {
         self.is_torn_off = self.carried.is_some();
         self.drop_carried();
@@ -225,12 +225,13 @@ impl World {
         let end = tip.point(Vector::new(hand::CUP, 0.0, 0.0));
         self.objects.iter().position(|object| {
             let touch = object.solid.touch(&object.frame, end, SUCTION);
-            // The cup closes on a face that it meets straight on.
+            // The cup seals only on a face that is roughly at a right angle to it.
             touch.is_some_and(|touch| touch.normal.dot(tip.x) < -0.9)
         })
     }
 
-    /// Finds what is between the claws, and moves it to their middle as they close. Returns where they touch it.
+    /// Finds the object between the claws, and moves it to their middle as they close. Returns the angle of joint 7 at which they
+    /// touch it.
     fn claw_stop(&mut self, hand: &Hand) -> Option<f64> {
         let grip = hand.grip();
         self.between = match self.carried {
@@ -256,13 +257,13 @@ impl World {
             let Vector { x, y, z } = grip.frame.local(object.frame.origin);
             let reach = |axis| object.solid.reach(&object.frame, axis);
             let [ahead, aside, above] = [grip.frame.x, grip.frame.y, grip.frame.z].map(reach);
-            // Both pads have to meet it, which each does with its middle.
+            // The middle of each pad has to meet the object.
             let is_at_pads = x.abs() < ahead && z.abs() < above;
             is_at_pads && y.abs() < grip.gap / 2.0 && 2.0 * aside < grip.gap + PLAY
         })
     }
 
-    /// The balls of the arm, and the corners of what it carries.
+    /// The balls of the arm, and the corners of the carried object.
     fn balls(&self, hand: &Hand) -> Vec<Ball> {
         let carried = self.carried.and_then(|(index, _)| self.objects.get(index));
         let corners = carried
@@ -271,12 +272,12 @@ impl World {
         hand.balls(self.scene.tool).chain(corners).collect()
     }
 
-    /// Does the pad of a finger touch this object, instead of its end?
+    /// Is this ball the end of a finger whose pad touches the object instead? Then the ball does not touch it.
     fn is_left_to_pads(&self, index: usize, ball: &Ball) -> bool {
         ball.is_finger_end && self.between == Some(index)
     }
 
-    /// What pushes the arm back.
+    /// The torques of all contacts, in mN m.
     fn torques(&self, hand: &Hand, balls: &[Ball]) -> [f64; 6] {
         let mut sum = [0.0; 6];
         for ball in balls {

@@ -12,11 +12,11 @@ use super::{Object, World};
 const STEP_S: f64 = 0.001;
 /// In mm per second squared.
 const GRAVITY: f64 = 9_807.0;
-/// What is left of a sum and a difference, in mm.
+/// The tolerance for rounding errors in heights, in mm.
 const ROUNDING: f64 = 1e-6;
 /// Two surfaces this near to each other touch, in mm.
 const NEAR: f64 = 0.5;
-/// Objects that push each other: no longer row moves.
+/// A pushed object moves at most this many other objects in a row. A longer row does not move.
 const LONGEST_ROW: u32 = 4;
 
 impl World {
@@ -29,14 +29,14 @@ impl World {
             let Some(object) = self.objects.get_mut(index) else { continue };
             let is_falling = bottom > support + ROUNDING;
             object.speed = if is_falling { object.speed + GRAVITY * STEP_S } else { 0.0 };
-            // What was pressed down when it was let go comes up again.
+            // An object that was pressed into its support when it was let go comes up again.
             let next = (bottom - object.speed * STEP_S).max(support);
             object.frame.origin.z = next + object.solid.half_height();
             self.is_moving |= is_falling;
         }
     }
 
-    /// The top of what is below this point, the middle of the object with this index: at least the table.
+    /// The height of the highest top below `middle`, the middle of the object `index`: of the table, a wall or another object.
     pub(super) fn support(&self, index: Option<usize>, middle: Point) -> f64 {
         let walls = self.walls.iter().filter_map(|(frame, solid)| {
             let at = Vector::new(middle.x, middle.y, frame.origin.z);
@@ -50,7 +50,7 @@ impl World {
         tops.filter(|top| *top <= middle.z).fold(self.scene.table, f64::max)
     }
 
-    /// Objects move out of the way of a ball that touches their side.
+    /// Moves objects out of the way of a ball that touches their side.
     pub(super) fn push_objects(&mut self, ball: &Ball) {
         for index in 0..self.objects.len() {
             let Some(object) = self.objects.get(index) else { continue };
@@ -64,7 +64,7 @@ impl World {
         }
     }
 
-    /// Moves an object along the table, and those in its way. Returns whether nothing stops it.
+    /// Moves an object along the table, and those in its way. Returns whether it moved: a wall or a longer row stops it.
     pub(super) fn shove(&mut self, index: usize, by: Point, row: u32) -> bool {
         let Some(object) = self.objects.get(index) else { return false };
         let (radius, bottom, top) = (object.solid.inner_radius(), object.bottom(), object.top());
@@ -97,7 +97,7 @@ impl World {
         true
     }
 
-    /// Moves an object, and what stands on it.
+    /// Moves an object, and the objects that stand on it.
     fn slide(&mut self, index: usize, by: Point) {
         for rider in self.riders(index) {
             self.slide(rider, by);
@@ -108,7 +108,7 @@ impl World {
         }
     }
 
-    /// What stands on an object.
+    /// The objects that stand on an object.
     fn riders(&self, index: usize) -> Vec<usize> {
         let Some(below) = self.objects.get(index) else { return Vec::new() };
         let stands_on_it = |rider: &Object| {

@@ -1,26 +1,26 @@
-//! The forms of things, and where they touch a point.
+//! The forms of objects and walls, and where they touch a point.
 
 use kinematics::{Float, Vector};
 
 use super::frame::{Frame, Point};
 use crate::scene::Form;
 
-/// A form round the origin of its frame.
+/// A form, centred on the origin of its frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) enum Solid {
-    /// Half of its edges, in mm.
+    /// Half of the edges along x, y and z, in mm.
     Box([f64; 3]),
-    /// Along z. In mm.
+    /// The axis is along z. Lengths are in mm.
     Cylinder { radius: f64, half_height: f64 },
 }
 
-/// A touch.
+/// The contact of a solid with a ball.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Touch {
-    /// How far the point is inside, in mm.
+    /// How deep the ball is in the solid, in mm.
     pub(super) depth: f64,
-    /// The direction out of the solid.
+    /// The direction out of the solid, of length 1.
     pub(super) normal: Point,
 }
 
@@ -51,7 +51,7 @@ impl Solid {
         }
     }
 
-    /// How far it reaches from its middle in this direction, in mm.
+    /// How far the solid reaches from its middle in this direction, in mm.
     pub(super) fn reach(self, frame: &Frame, direction: Point) -> f64 {
         let [x, y, z] = [frame.x, frame.y, frame.z].map(|axis| axis.dot(direction).abs());
         match self {
@@ -62,7 +62,7 @@ impl Solid {
         }
     }
 
-    /// Where a ball of this radius round a point touches it: at the face that is nearest.
+    /// The contact with a ball of this radius round a point, at the nearest face. `None`: they do not touch.
     pub(super) fn touch(self, frame: &Frame, point: Point, ball: f64) -> Option<Touch> {
         let Vector { x, y, z } = frame.local(point);
         let above = |value: f64, axis: Point| if value < 0.0 { -axis } else { axis };
@@ -85,7 +85,7 @@ impl Solid {
         (distance < ball).then_some(Touch { depth: ball - distance, normal })
     }
 
-    /// The points of it that stick out furthest, for its contact with others.
+    /// The corners, for contacts with other solids. A cylinder has those of the box that it contains.
     pub(super) fn corners(self, frame: &Frame) -> [Point; 8] {
         let [x, y, z] = match self {
             Self::Box(half) => half,

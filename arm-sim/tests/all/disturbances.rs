@@ -1,4 +1,4 @@
-//! What disturbs a running arm: faults and how often they took effect, the supply, a weight, and the power switch.
+//! Disturbances of a running arm: faults and how often they took effect, the supply, a weight, and the power switch.
 
 use arm_sim::faults::{ArmFault, FaultLocation, FaultReport};
 use arm_sim::request::Request;
@@ -170,7 +170,7 @@ fn a_weight_in_the_gripper_loads_the_joints_until_a_servo_gives_up() {
     let unloaded = load(&arm);
     arm.plant_mut().set_load(150);
     arm.advance(millis(1_000));
-    // 150 g at 288.5 mm are 424 mN m of a stall torque of 2450: 173, and the gear's friction is held back twice.
+    // 150 g at 288.5 mm are 424 of 2450 mN m, which is a load of 173. Friction carries a part in both measurements.
     assert!((150..=180).contains(&(load(&arm) - unloaded)), "{unloaded}, then {}", load(&arm));
     arm.plant_mut().set_load(1_000);
     arm.advance(millis(3_000));

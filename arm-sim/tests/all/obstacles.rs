@@ -1,4 +1,4 @@
-//! What an arm meets: walls, hands, a thing between the claws; and how its servos protect themselves.
+//! Obstacles of an arm: walls, hands, a thing between the claws. How servos protect themselves.
 
 use crate::rig::{Rig, near};
 use arm_sim::plant::{Thing, Wall};
@@ -25,7 +25,7 @@ const fn wall(degrees: i32, stiffness: Option<u16>) -> Option<Wall> {
     Some(Wall { millidegrees: degrees * 1_000, stiffness })
 }
 
-/// Did the forearm come up to this goal? 459 mN m and 123 mN m of friction are 4.8 counts.
+/// Did the forearm rise to this goal? A weight of 459 mN m and 123 mN m of friction are 4.8 counts.
 fn is_lifted(rig: &Rig, goal: u16) -> bool {
     (0..=5).contains(&goal.saturating_sub(rig.counts(FOREARM)))
 }
@@ -76,7 +76,7 @@ fn a_joint_turns_away_from_its_wall() {
 #[test]
 fn a_soft_wall_gives_way() {
     let mut rig = Rig::driven();
-    // 570 mN m per degree, as the servo has.
+    // 570 mN m per degree, which is the stiffness of the servo.
     rig.plant.set_wall(BASE, wall(95, Some(570)));
     turn_base(&mut rig, 511 + 24 + 14);
     rig.pass(2_000);
@@ -147,7 +147,7 @@ fn a_soft_thing_is_pressed_and_can_be_dropped() {
     rig.plant.set_load(50);
     set_claw(&mut rig, 820);
     rig.pass(2_000);
-    // 4.1 degrees beyond it, and 588 mN m in 4.3 degrees are 137 mN m per degree.
+    // The goal is 4.1 degrees beyond the thing. The servo has the same stiffness: 588 mN m in 4.3 degrees, 137 per degree.
     let depth = 30_000 - rig.plant.angle(CLAW);
     assert!((1_900..2_200).contains(&depth), "{depth}");
     assert!(rig.plant.thing_count().effects > 500);
@@ -232,7 +232,7 @@ fn heat_frees_a_joint_until_it_has_cooled_down_and_then_it_swings_to_its_goal() 
 #[test]
 fn a_stalled_servo_overheats_if_its_overload_does_not_stop_it() {
     let mut rig = Rig::driven();
-    // Heat unloads, overload does not.
+    // Heat switches the motor off; an overload does not.
     set(&mut rig, BASE, register::UNLOAD_CONDITIONS, error::OVERHEAT);
     rig.plant.set_wall(BASE, wall(90, None));
     turn_base(&mut rig, 700);

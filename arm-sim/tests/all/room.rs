@@ -6,7 +6,7 @@ use arm_sim::{Action, Duration, Joint, Simulation};
 use kinematics::{Vector, ik6};
 use motion_core::calibration::MicroDegrees;
 
-/// From the tip to the middle of the pads, with claws that hold 30 mm.
+/// Distance from the tip to the middle of the pads in mm, with claws that hold 30 mm.
 const PADS: f64 = 59.5;
 const BLOCKED_JOINTS: u8 = 195;
 
@@ -21,7 +21,7 @@ impl Room {
         Self(arm)
     }
 
-    /// Moves at 60 degrees per second to this point of the tip, with the tool straight down.
+    /// Moves the tip to this point at the default speed, with the tool straight down.
     #[expect(clippy::cast_possible_truncation, reason = "angles of a pose")]
     fn tip_to(&mut self, x: f64, y: f64, z: f64) {
         let angles = ik6(Vector::new(x, y, z), Vector::new(0.0, 0.0, -1.0)).unwrap();
@@ -30,7 +30,7 @@ impl Room {
         self.write(128, &bytes);
     }
 
-    /// As [`Self::tip_to`], along a straight line from another point.
+    /// Moves the tip along the vertical at x and y from the height `from` to the height `to`, in ten steps.
     fn line(&mut self, [x, y, from]: [f64; 3], to: f64) {
         for step in 1..=10 {
             self.tip_to(x, y, from + (to - from) * f64::from(step) / 10.0);
@@ -48,7 +48,7 @@ impl Room {
 
     /// The joints that are blocked.
     fn blocked(&mut self) -> u8 {
-        // The registers of joints are up to date when a host reads them.
+        // The registers of the joints are updated when a host reads them.
         self.0.send_request(&Request::Read { address: BLOCKED_JOINTS, count: 1 });
         self.0.advance(Duration::from_millis(100));
         self.0.registers().get(BLOCKED_JOINTS)
@@ -66,7 +66,7 @@ impl Room {
         assert!(distance <= within, "{name} is at {place:?}, {distance:.1} mm from {x} {y} {z}");
     }
 
-    /// Grips what stands at this point, and lifts it.
+    /// Grips the object whose middle is at this point, and lifts it.
     pub fn pick(&mut self, x: f64, y: f64, z: f64) {
         self.claws_to(60);
         self.tip_to(x, y, z + PADS + 60.0);
@@ -75,7 +75,7 @@ impl Room {
         self.line([x, y, z + PADS], z + PADS + 60.0);
     }
 
-    /// Puts what it carries down at this point, and goes up.
+    /// Puts the carried object down with its middle at this point, and goes up.
     fn put(&mut self, x: f64, y: f64, z: f64) {
         self.tip_to(x, y, z + PADS + 60.0);
         self.line([x, y, z + PADS + 60.0], z + PADS);

@@ -171,7 +171,7 @@ fn a_host_that_does_not_read_loses_no_answer_and_does_not_stop_the_arm() {
     }
 }
 
-/// A long write with a whole read in its data. The read is executed only if the line seems idle after it.
+/// A long write whose data holds a whole read. The read is executed only if the line seems idle behind it (D4).
 fn write_around_a_read() -> FrameBuffer {
     let values = [&[0; 4][..], &frame(READ_POSITIONS), &[0; 180]].concat();
     frame(Request::Write { address: 61, values: &values })

@@ -1,4 +1,4 @@
-//! The simulated servos from the side of the master: bytes on a wire, and time as an argument.
+//! The simulated servos as their master sees them: bytes on a wire, and time as an argument.
 
 use crate::rig::{Rig, near};
 use arm_sim::servo::ServoConfig;
@@ -130,7 +130,7 @@ fn only_a_servo_with_torque_is_driven() {
 
 #[test]
 fn a_servo_with_torque_and_without_a_goal_moves_to_0() {
-    // This shows a controller that switches torque on before it sends a goal.
+    // This exposes a controller that switches torque on before it sends a goal.
     let mut rig = Rig::ready();
     rig.torque(BASE, 1);
     rig.pass(2_000);

@@ -1,4 +1,4 @@
-//! A saved and loaded arm goes on as the original does, whatever it was doing.
+//! A saved and loaded arm behaves exactly as the original does, in any state.
 
 use arm_sim::request::Request;
 use arm_sim::{Action, Duration, Simulation};
@@ -15,7 +15,7 @@ use crate::room::Room;
 const REST: [u16; 7] = [9_000, 9_000, 6_500, 9_000, 9_000, 9_000, 8_000];
 /// The first bytes of a write.
 const UNFINISHED: [u8; 6] = [0xAA, 0x77, 6, 46, 7, 1];
-/// What is done to the arm.
+/// The actions from which the property test chooses.
 const ACTIONS: [&str; 34] = [
     "fault 1=missing 700000",
     "fault 2=late=20 1500000",
@@ -54,7 +54,7 @@ const ACTIONS: [&str; 34] = [
     "scene table 190; cube red 40 100 40 260; cylinder can 40 60 200 -40 250; wall shelf 0 280 200 40 50",
 ];
 
-/// The host sends a point of a stream, and something else.
+/// The host sends a point of a stream, and one other request.
 fn send_point(arm: &mut Simulation, number: u16) {
     let wave = 200 * (number % 20).abs_diff(10);
     let point: Vec<u8> = REST.iter().flat_map(|angle| (angle + wave).to_le_bytes()).collect();

@@ -1,4 +1,4 @@
-//! An arm as the maker ships it, from the side of the host.
+//! An arm as the maker delivers it, as a host sees it.
 
 use arm_sim::flash::Flash;
 use arm_sim::plant::Plant;
@@ -19,7 +19,7 @@ struct Bench {
 }
 
 impl Bench {
-    /// An arm that was switched on and has sent its first text.
+    /// An arm that was switched on 3 s ago and has sent its first text.
     fn new() -> Self {
         let config =
             ArmConfig { chip_id: *b"SIM\0\0\x01", is_paced: false, torque_codes: TorqueCodes::default() };

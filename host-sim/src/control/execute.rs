@@ -36,7 +36,7 @@ pub fn execute<F: NorFlash + Clone, C: ArmController>(
     ControlReply::Line(request::line(answer))
 }
 
-/// An arm and its clock, which obey requests.
+/// An arm and its clock, on which requests are executed.
 struct Executor<'a, F, C> {
     arm: &'a mut PtyArm<F, Plant, C>,
     clock: &'a mut VirtualClock,
@@ -80,13 +80,13 @@ impl<F: NorFlash + Clone, C: ArmController> Executor<'_, F, C> {
         self.clock.now()
     }
 
-    /// Does something to the arm. Returns the reports of the faults that this ended.
+    /// Carries out an action. Returns the reports of the faults that it ended.
     fn act(&mut self, action: Action) -> Vec<Value> {
         let now = self.now();
         state::reports(&self.arm.act(now, action), now)
     }
 
-    /// Refuses if the arm has no power.
+    /// Carries out an action, or refuses it if the arm has no power.
     fn act_with_power(&mut self, action: Action) -> Result<Value, ControlRefusal> {
         if !self.arm.simulation_mut().has_power() {
             let hint = "`sevenbot sim power on` switches it on";
@@ -239,7 +239,7 @@ fn joint_of(number: u8) -> Result<Joint, ControlRefusal> {
     Joint::new(number).ok_or_else(|| ControlRefusal::new("no such joint", "joints are 1 to 7"))
 }
 
-/// The position of a joint's servo in counts.
+/// Converts an angle of a joint to the position of its servo in counts.
 fn counts(joint: Joint, degrees: f64) -> Result<u16, ControlRefusal> {
     if !(0.0..=180.0).contains(&degrees) {
         return Err(ControlRefusal::new(

@@ -1,6 +1,7 @@
 //! Where the control sockets are: by default in `$XDG_RUNTIME_DIR/7bot`, or else in the state directory.
 //!
-//! `sevenbot sim` looks there too. The name has the number of the process, so that simulators do not share one.
+//! `sevenbot sim` searches the same directories. The name of a socket contains the process id, so that each simulator has its
+//! own.
 
 use std::fs::{self, DirBuilder};
 use std::io;
@@ -10,7 +11,7 @@ use std::path::{Path, PathBuf};
 use rustix::io::Errno;
 use rustix::process::{Pid, test_kill_process};
 
-/// The start of a default name; the number of the process follows.
+/// The start of a default name; the process id follows.
 const PREFIX: &str = "control-";
 /// The end of a default name.
 const SUFFIX: &str = ".sock";
@@ -26,7 +27,7 @@ pub fn directory(variable: impl Fn(&str) -> Option<PathBuf>) -> Option<PathBuf> 
 /// The default path of this process. Creates the directory, and removes the sockets of simulators that were killed.
 ///
 /// # Errors
-/// There is no directory, or it cannot be created.
+/// The environment names no directory, or the directory cannot be created.
 pub fn default() -> io::Result<PathBuf> {
     let found = directory(|name| std::env::var_os(name).map(PathBuf::from));
     let directory = found.ok_or_else(|| io::Error::other("neither XDG_RUNTIME_DIR nor HOME is set"))?;
@@ -40,13 +41,13 @@ fn remove_left_ones(directory: &Path) {
     let Ok(entries) = fs::read_dir(directory) else { return };
     for path in entries.flatten().map(|entry| entry.path()) {
         if owner(&path).is_some_and(|owner| test_kill_process(owner) == Err(Errno::SRCH)) {
-            // Another simulator may have removed it.
+            // Another simulator may have removed the file already.
             let _ = fs::remove_file(path);
         }
     }
 }
 
-/// The process in the name of a default socket.
+/// The process id in the name of a default socket.
 fn owner(path: &Path) -> Option<Pid> {
     let name = path.file_name()?.to_str()?.strip_prefix(PREFIX)?.strip_suffix(SUFFIX)?;
     let number = name.split_once('-').map_or(name, |(process, _arm)| process);

@@ -12,16 +12,16 @@ use serde_json::{Value, json};
     expecting = "a request is an object with a member \"do\""
 )]
 pub enum ControlRequest {
-    /// Gives the arm a fault, for a time or until it is taken back.
+    /// Adds a fault, for a time or until it is removed.
     Fault {
         /// The fault, as in `--fault`.
         fault: String,
-        /// The duration in milliseconds of virtual time.
+        /// The duration in milliseconds of virtual time; `None`: until it is removed.
         for_ms: Option<u64>,
     },
-    /// Takes faults back.
+    /// Removes faults.
     Clear {
-        /// The location, as `3` or `line`. All faults without it.
+        /// The location, such as `3` or `line`. `None`: all faults.
         at: Option<String>,
     },
     /// Lists the faults.
@@ -35,21 +35,21 @@ pub enum ControlRequest {
     },
     /// Puts a weight into the gripper.
     Weight {
-        /// The weight; 0 takes it away.
+        /// The weight; 0 removes it.
         grams: u16,
     },
     /// Drops what is in the gripper: the thing between the claws, and the weight.
     Drop,
-    /// Puts a scene on the table round the arm.
+    /// Puts a scene on the table round the arm, or removes it.
     Scene {
-        /// The scene; `off` takes it away.
+        /// The scene in its text form, or `off`.
         scene: String,
     },
     /// Forces an alarm on a servo.
     Trip {
         /// The joint, 1 to 7.
         joint: u8,
-        /// The alarm; an overload without it.
+        /// The alarm; by default an overload.
         #[serde(default)]
         alarm: Alarm,
     },
@@ -60,13 +60,13 @@ pub enum ControlRequest {
     },
     /// Restarts the controller. The servos keep their power.
     Restart,
-    /// Stops the controller, as a program that hangs.
+    /// Stops the controller, as if its program hung.
     Halt,
     /// Stops virtual time.
     Pause,
     /// Lets virtual time go on after a pause.
     Resume,
-    /// Lets virtual time pass as fast as possible. The answer comes at its end.
+    /// Lets this virtual time pass as fast as possible. The answer comes at the end of it.
     Advance {
         /// The time in milliseconds.
         ms: u64,
@@ -94,10 +94,10 @@ pub enum ControlRequest {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Alarm {
-    /// It latches an overload: free until its torque is switched off and on.
+    /// The servo latches an overload: the joint is free until its torque is switched off and on.
     #[default]
     Overload,
-    /// It is 5 degrees Celsius hotter than its limit: free until it has cooled down.
+    /// The servo is 5 degrees Celsius hotter than its limit: the joint is free until the servo has cooled down.
     Heat,
 }
 
@@ -105,9 +105,9 @@ pub enum Alarm {
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(untagged, expecting = "the hand takes an angle in degrees, \"hold\" or \"let-go\"")]
 pub enum HandAction {
-    /// Turns it to this angle in degrees, and holds it there.
+    /// Turns the joint to this angle in degrees, and holds it there.
     Degrees(f64),
-    /// Holds it, or lets it go.
+    /// Holds the joint where it is, or lets it go.
     Grip(Grip),
 }
 
@@ -115,7 +115,7 @@ pub enum HandAction {
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(untagged, expecting = "the speed is a factor from 0.001 to 1000, or \"max\"")]
 pub enum SpeedFactor {
-    /// Times real time.
+    /// This multiple of the speed of real time.
     Times(f64),
     /// As fast as possible.
     Max(MaxSpeed),
@@ -133,9 +133,9 @@ pub enum MaxSpeed {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Grip {
-    /// Until the joint has torque.
+    /// A hand holds the joint until the joint has torque.
     Hold,
-    /// Without torque, a loaded joint falls.
+    /// No hand holds the joint. Without torque, a loaded joint falls.
     LetGo,
 }
 
@@ -171,7 +171,7 @@ impl ControlRefusal {
 /// Parses a line.
 ///
 /// # Errors
-/// It is no request.
+/// The line is not a request.
 pub fn parse(line: &[u8]) -> Result<ControlRequest, ControlRefusal> {
     serde_json::from_slice(line).map_err(|error| {
         ControlRefusal::new(
@@ -181,7 +181,7 @@ pub fn parse(line: &[u8]) -> Result<ControlRequest, ControlRefusal> {
     })
 }
 
-/// The line of an answer, with its end.
+/// The line of an answer, with its line feed.
 #[must_use]
 pub fn line(answer: Result<Value, ControlRefusal>) -> String {
     let value = match answer {

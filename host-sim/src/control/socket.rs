@@ -1,7 +1,8 @@
 //! The clients of a control socket: lines in, lines out, with bounded memory.
 //!
-//! A client that sends garbage gets errors. A client that does not read its answers waits until it does. A line that is
-//! too long, or one client too many, ends the connection. The others notice nothing.
+//! A client that sends garbage gets errors. If a client does not read its answers, its next requests wait until it does. A line
+//! that is too long ends the connection of its client, and a client beyond the limit is refused. Other clients are not
+//! affected.
 
 use std::io::{self, Read, Write};
 use std::mem;
@@ -20,7 +21,7 @@ use crate::private_socket::{PrivateSocket, SocketError, is_temporary};
 const LONGEST_LINE: usize = 4_096;
 /// No request of a client is executed while this many bytes of answers wait for it.
 const LONGEST_BACKLOG: usize = 64 * 1_024;
-/// Clients at the same time.
+/// The most clients at the same time.
 const CLIENTS: usize = 16;
 
 /// How a request is answered.
@@ -28,7 +29,7 @@ const CLIENTS: usize = 16;
 pub enum ControlReply {
     /// At once, with this line.
     Line(String),
-    /// At this virtual time, with the time. The client's next requests wait.
+    /// At this virtual time, with a line that tells the time. The client's next requests wait.
     At(Instant),
 }
 
@@ -44,9 +45,9 @@ struct ControlClient {
     stream: UnixStream,
     input: Vec<u8>,
     output: Vec<u8>,
-    /// The virtual time of its next answer.
+    /// The virtual time of the answer for which the client waits.
     waits_until: Option<Instant>,
-    /// It sends nothing more, or nothing more is accepted.
+    /// The client sends nothing more, or nothing more is accepted from it.
     is_at_end: bool,
     /// The connection failed.
     is_gone: bool,
@@ -76,7 +77,7 @@ impl ControlSocket {
         Ok(epoll::add(epoll, &self.socket, data, EventFlags::IN)?)
     }
 
-    /// The virtual time for which a client waits.
+    /// The earliest virtual time for which a client waits.
     #[must_use]
     pub fn due(&self) -> Option<Instant> {
         self.clients.iter().filter_map(|client| client.waits_until).min()
@@ -150,7 +151,7 @@ impl ControlClient {
         }
     }
 
-    /// Executes the whole lines. Returns whether there was one.
+    /// Executes the complete lines that have arrived. Returns whether there was a request.
     fn execute(&mut self, execute: &mut impl FnMut(&[u8]) -> ControlReply) -> bool {
         let mut has_executed = false;
         while self.output.len() < LONGEST_BACKLOG
@@ -248,7 +249,7 @@ mod tests {
             client
         }
 
-        /// Polls, with requests that are answered with their own length.
+        /// Polls the socket. The answer to each request is its length.
         fn poll(&mut self) {
             self.poll_with(Instant::ZERO, |request| ControlReply::Line(format!("{}\n", request.len())));
         }

@@ -48,7 +48,7 @@ pub fn of<F: NorFlash + Clone, C: ArmController>(pty_arm: &mut PtyArm<F, Plant, 
     })
 }
 
-/// What stands on the table, and what the arm carries.
+/// The objects of the scene, on the table or carried by the arm.
 pub(super) fn objects(plant: &Plant) -> Vec<Value> {
     let of = |object: &Object| {
         let at = object.frame.origin;
@@ -101,7 +101,7 @@ fn registers(registers: &RegisterFile) -> Value {
     })
 }
 
-/// The reports of faults as JSON, with the time that is left at `now`.
+/// The reports of faults as JSON, with the remaining time of each fault at `now`.
 #[must_use]
 pub fn reports(reports: &[FaultReport], now: Instant) -> Vec<Value> {
     reports.iter().map(|report| self::report(report, now)).collect()

@@ -1,4 +1,4 @@
-//! The built simulator from the side of the user: first line, files, signals, exit statuses.
+//! The built simulator as a user sees it: first line, files, signals, exit statuses.
 
 #[allow(dead_code)] // Each test file uses a part of it.
 use crate::sim;
@@ -73,7 +73,7 @@ fn the_link_of_a_killed_simulator_is_replaced() {
     let link = directory.path().join("7bot");
     let arguments = ["--eeprom", "none", "--link", link.to_str().unwrap()];
     assert_eq!(Sim::start(&arguments).end_with(Signal::KILL), None);
-    // Another process may have a terminal of the old number meanwhile, and then the link is refused.
+    // Another process may own a terminal with the old number by now. Then the link is refused.
     if fs::metadata(&link).is_err() {
         let next = Sim::start(&arguments);
         assert_eq!(fs::read_link(&link).unwrap(), next.port());
@@ -204,7 +204,7 @@ fn sigusr2_restarts_the_controller_and_the_servos_hold() {
     assert_eq!(client.read(SPEED.address, 1), [60], "registers in RAM are lost");
     client.read_until(TARGET_POSITION.address, &[100]);
     let present = client.read(PRESENT_POSITION.address, 7);
-    // The forearm droops by 0.7 degrees, and once more after the restart.
+    // The forearm droops by 0.7 degrees.
     let is_held = present.iter().zip([100, 90, 66, 90, 90, 90, 80]).all(|(is, held)| is.abs_diff(held) <= 1);
     assert!(is_held, "{present:?}");
 }
@@ -322,7 +322,7 @@ fn a_stale_servo_socket_is_replaced() {
     ping(&mut UnixStream::connect(&path).unwrap());
 }
 
-/// Pings servo 0 until it answers: it has to start first.
+/// Pings servo 0 until it answers: a servo does not answer until it has started.
 fn ping(bus: &mut UnixStream) -> [u8; 6] {
     bus.set_read_timeout(Some(Duration::from_millis(200))).unwrap();
     for _ in 0..300 {

@@ -1,4 +1,4 @@
-//! The built simulator as a controller with servos behind a USB adapter, which a second process simulates.
+//! The built simulator as a controller. A second process simulates its servos and the USB adapter.
 //!
 //! ```text
 //!   client ──▶ host-sim --servos ──▶ link ──▶ host-sim --servos-only --trace ──▶ log
@@ -18,7 +18,7 @@ const ALL_MISSING: u8 = 0x7F;
 const DAMPING: u8 = 0;
 const ON: u8 = 1;
 const STANDARD_POSE: [u8; 7] = [90, 90, 65, 90, 90, 90, 80];
-/// In milliseconds: longer than the delay of an answer on a busy machine.
+/// A timeout in milliseconds that is longer than the delay of an answer on a busy machine.
 const PATIENT: [&str; 2] = ["--usb-timeout", "300"];
 
 /// Seven servos behind an adapter, and their controller.
@@ -28,7 +28,7 @@ struct Rig {
     folder: tempfile::TempDir,
 }
 
-/// A frame on the wire: instruction and parameters.
+/// A frame of the controller: instruction and parameters.
 type Question = (u8, Vec<u8>);
 
 impl Rig {
@@ -67,7 +67,7 @@ impl Rig {
         fs::read_to_string(self.folder.path().join("servos")).unwrap()
     }
 
-    /// Had all writes to a torque switch this value?
+    /// Did all writes to a torque switch so far have this value?
     fn has_set_all_torque_to(&self, code: u8) -> bool {
         torque_sets(&self.trace()).iter().all(|&(_, set)| set == code)
     }
@@ -110,7 +110,8 @@ fn frames(trace: &str) -> Vec<Question> {
     frames
 }
 
-/// The ids and values of all writes to torque switches. A frame has the register, its length, and pairs of both.
+/// The ids and values of all writes to torque switches. The parameters of such a frame are the register, the length of a value,
+/// and pairs of id and value.
 fn torque_sets(trace: &str) -> Vec<(u8, u8)> {
     let frames = frames(trace);
     assert!(frames.iter().all(|(code, _)| *code != Instruction::Write as u8), "no servo is written to alone");
@@ -160,7 +161,7 @@ fn hold_on_exit_leaves_the_servos_holding() {
     }
 }
 
-/// The next controller engages the arm at its position.
+/// The next controller engages the arm where it stands (D12).
 #[test]
 fn d12_a_second_controller_finds_the_arm_holding_and_lets_no_joint_go() {
     let mut rig = Rig::start(&[], &[PATIENT.as_slice(), &["--hold-on-exit"]].concat());
@@ -178,7 +179,7 @@ fn d12_a_second_controller_finds_the_arm_holding_and_lets_no_joint_go() {
     assert!(rig.has_set_all_torque_to(ON));
 }
 
-/// D12: silent joints hold, and engage only after a measurement.
+/// Silent joints hold, and engage only after a measurement (D12).
 #[test]
 fn d12_the_arm_holds_while_the_adapter_is_unplugged() {
     let rig = Rig::start(&["--usb-latency", "1-4"], &PATIENT);

@@ -1,4 +1,4 @@
-//! `--record` and `--replay`: a session in real time, replayed in virtual time.
+//! `--record` and `--replay`: a session is recorded in real time and replayed in virtual time.
 
 #[allow(dead_code)] // Each test file uses a part of it.
 use crate::sim;
@@ -66,9 +66,9 @@ fn a_replay_that_differs_says_where_in_words() {
     let file = folder.path().join("session");
     record(&file, &["--eeprom", "none"]);
     let text = fs::read_to_string(&file).unwrap();
-    // The file says that the arm answered something else.
+    // Change a byte of a recorded answer.
     let frame = "< aa7703";
-    // A line may end within a frame.
+    // Skip a line that ends within the head of a frame.
     let is_longer = |&(at, _): &(usize, &str)| !text[at + frame.len()..].starts_with('\n');
     let (start, _) = text.match_indices(frame).find(is_longer).unwrap();
     let (before, after) = (&text[..start], &text[start + frame.len() + 2..]);

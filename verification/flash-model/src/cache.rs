@@ -1,7 +1,6 @@
 //! A data cache in front of the cells. It loads whole lines, and a write updates both the cells and the line.
 //!
-//! So a line shows the written value even if the cells did not take it. To verify a write, flush the cache before the
-//! read.
+//! So a line shows the written value even if the cells did not change. To verify a write, flush the cache before the read.
 
 use std::collections::VecDeque;
 

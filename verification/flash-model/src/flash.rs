@@ -24,11 +24,11 @@ pub struct Cut {
     pub program: ProgramTear,
     /// The result if the cut interrupts an erase.
     pub erase: EraseTear,
-    /// Seed of the random choices of a tear.
+    /// Seed of the random choices of the tear.
     pub seed: u64,
 }
 
-/// Bits of the word at an address.
+/// Some bits of the word at an address.
 #[derive(Clone, Copy, Debug)]
 struct Bits {
     address: usize,
@@ -40,11 +40,11 @@ struct Bits {
 pub struct Flash<const SECTOR: usize, const WORD: usize = 4> {
     /// The present contents.
     cells: Vec<u8>,
-    /// The value that each word was programmed with since its sector was erased.
+    /// The value with which each word was programmed since its sector was erased; all ones if it was not.
     requested: Vec<u8>,
     /// Bits that may read differently after the next power-up.
     marginal: Vec<Bits>,
-    /// Worn bits that always stay ones.
+    /// Worn bits that programming does not change.
     unprogrammable: Vec<Bits>,
     /// The operations since the last power-up.
     history: Vec<Operation>,
@@ -67,7 +67,7 @@ impl<const SECTOR: usize, const WORD: usize> Flash<SECTOR, WORD> {
         Self::holding(&vec![0xFF; SECTOR * sectors])
     }
 
-    /// A flash with these contents. Their length is a multiple of `SECTOR`.
+    /// A flash with these contents, whose length must be a multiple of `SECTOR`.
     #[must_use]
     pub fn holding(bytes: &[u8]) -> Self {
         Self {
@@ -122,7 +122,8 @@ impl<const SECTOR: usize, const WORD: usize> Flash<SECTOR, WORD> {
         self.powered
     }
 
-    /// Switches the power off and on. The seed `start` decides how marginal bits read. Cancels a future cut.
+    /// Switches the power off and on. The seed `start` decides how marginal bits read. Cancels a planned cut, permits erases,
+    /// and clears the history.
     pub fn power_up(&mut self, start: u64) {
         self.powered = true;
         self.cut = None;
@@ -134,7 +135,7 @@ impl<const SECTOR: usize, const WORD: usize> Flash<SECTOR, WORD> {
         }
     }
 
-    /// Plans a power cut.
+    /// Plans a power cut. It replaces a cut that was planned before.
     pub const fn cut_power(&mut self, cut: Cut) {
         self.cut = Some(cut);
     }
@@ -151,7 +152,7 @@ impl<const SECTOR: usize, const WORD: usize> Flash<SECTOR, WORD> {
         }
     }
 
-    /// Wears a bit out: it cannot be programmed to 0 any more.
+    /// Wears a bit out: programming cannot change it to 0 any more.
     pub fn wear_out_bit(&mut self, bit: usize) {
         let address = bit / 8 / WORD * WORD;
         self.unprogrammable.push(Bits { address, mask: 1 << (bit - address * 8) });
@@ -224,7 +225,7 @@ impl<const SECTOR: usize, const WORD: usize> Flash<SECTOR, WORD> {
         Err(Error::PowerLost)
     }
 
-    /// Records the requested value of a word, or refuses a second value.
+    /// Records the requested value of a word, or refuses a different second value.
     fn request(&mut self, address: usize, new: &[u8]) -> Result<(), Error> {
         let requested = self.requested.get_mut(address..address + WORD).unwrap_or_default();
         let is_blank = |word: &[u8]| word.iter().all(|byte| *byte == 0xFF);

@@ -15,8 +15,8 @@ pub(crate) struct Torn {
     pub(crate) marginal: u32,
 }
 
-/// How a power cut interrupts the programming of a word, which clears bits. Only [`ProgramTear::Disturbed`] affects bits
-/// that are not to be cleared.
+/// How a power cut interrupts the programming of a word, which clears bits. Only [`ProgramTear::Disturbed`] affects other
+/// bits than those to be cleared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ProgramTear {
     /// The cut comes before the operation: nothing changes.
@@ -35,13 +35,13 @@ pub enum ProgramTear {
     MarginalWord,
     /// All bits are programmed but one, which is marginal.
     OneMarginal,
-    /// All bits are programmed but two, which are marginal. A single error correction cannot repair that.
+    /// All bits are programmed but two, which are marginal. A code that corrects single errors cannot repair this.
     TwoMarginal,
     /// One bit is marginal, the others are unchanged. Half of the power-ups show the old word.
     FaintOne,
     /// Two bits are marginal, the others are unchanged.
     FaintTwo,
-    /// Two bits are marginal that should stay ones. No NOR flash is known to do this, but the contract of `NorFlash`
+    /// Two bits that should stay ones are marginal. No NOR flash is known to do this, but the contract of `NorFlash`
     /// allows it. Not in [`ProgramTear::ALL`].
     Disturbed,
 }
@@ -89,8 +89,8 @@ impl ProgramTear {
     }
 }
 
-/// How a power cut interrupts the erase of a sector, which sets bits. Once an erase has begun, no earlier marginal bit is
-/// left.
+/// How a power cut interrupts the erase of a sector, which sets bits. An erase that has begun removes all earlier marginal
+/// bits of the sector.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum EraseTear {
     /// The cut comes before the operation: nothing changes.
@@ -101,17 +101,17 @@ pub enum EraseTear {
     Noise,
     /// A random part of the zeros is set.
     RandomBits,
-    /// The first part of the sector is blank.
+    /// The first part of the sector is blank, the rest is unchanged.
     Prefix,
-    /// The last part of the sector is blank.
+    /// The last part of the sector is blank, the rest is unchanged.
     Suffix,
     /// Both ends are blank, the middle is random.
     Edges,
     /// All bits are 0, because chips program a sector before they erase it.
     AllZero,
-    /// The first part is 0, for the same reason.
+    /// All bits of the first part are 0, for the same reason. The rest is unchanged.
     ZeroPrefix,
-    /// The sector is blank but for one bit in a hundred, which is 0.
+    /// The sector is blank, but one bit in a hundred is unchanged.
     MostlyBlank,
     /// The sector is blank, but one bit in a hundred is marginal.
     MarginalBlank,

@@ -3,7 +3,7 @@
 /// A voltage over time, linear between points.
 #[derive(Clone, Debug)]
 pub struct FlashSupply {
-    /// Microseconds and millivolts, in ascending order of time. The last voltage stays.
+    /// Times in microseconds and voltages in millivolts, in ascending order of time. The last voltage stays.
     points: Vec<(u32, u32)>,
 }
 
@@ -14,7 +14,7 @@ impl FlashSupply {
         Self { points: vec![(0, millivolts)] }
     }
 
-    /// Adds a point: `millivolts` at `micros`, which is later than all points before.
+    /// Adds a point: `millivolts` at `micros`, which must be later than all points before.
     #[must_use]
     pub fn then(mut self, micros: u32, millivolts: u32) -> Self {
         self.points.push((micros, millivolts));
@@ -40,7 +40,7 @@ fn between((from, start): (u32, u32), (to, end): (u32, u32), micros: u32) -> u32
     u32::try_from(millivolts).unwrap_or(0)
 }
 
-/// A comparator with hysteresis. The supply is low from a fall below one threshold until a rise above the other.
+/// A comparator with hysteresis. The supply is low from a fall below the lower threshold until it reaches the higher one.
 #[derive(Clone, Copy, Debug)]
 pub struct Comparator {
     falls_below: u32,
@@ -55,7 +55,7 @@ impl Comparator {
         Self { falls_below, rises_above, is_low: true }
     }
 
-    /// True if the supply is low.
+    /// Compares the present voltage. Returns true if the supply is low.
     pub const fn is_low(&mut self, millivolts: u32) -> bool {
         let threshold = if self.is_low { self.rises_above } else { self.falls_below };
         self.is_low = millivolts < threshold;

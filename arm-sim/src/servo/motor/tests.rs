@@ -2,9 +2,10 @@ use super::MotorMode::{Blocked, Driven, Free};
 use super::*;
 use crate::servo::surroundings::{Side, Surface};
 
-/// A motor may take longer than its set-point by this.
+/// A motor may arrive this much later than its set-point.
 const SETTLING_MS: u32 = 250;
-/// Static friction holds a joint within this of its set-point: 100 mN m of 2450 are 0.83 counts of 4.3 degrees.
+/// Static friction holds a joint within this distance of its set-point: 100 of 2450 mN m are 0.83 of the 20.3 counts for full
+/// duty.
 const FRICTION_COUNTS: u16 = 1;
 
 fn motor(joint: usize) -> Motor {
@@ -110,7 +111,7 @@ fn following_error_and_load_are_those_of_the_speed_and_the_friction() {
         assert!((300 - motor.speed() * sign).abs() <= 1, "{}", motor.speed());
         assert!((200..=207).contains(&(motor.load() * sign)), "{}", motor.load());
         assert!((29..=36).contains(&(motor.torque() * sign)), "{}", motor.torque());
-        // 20.3 counts for full duty.
+        // 20.3 counts of error give full duty.
         let error = i64::from(motor.load()) * 20_306 - motor.error;
         assert!(error.abs() < COUNT / 20, "{error} millionths of a count");
         steps(&mut motor, 3_000, Driven);
@@ -212,7 +213,7 @@ fn torque_stops_a_fall() {
     let caught_at = motor.position_counts();
     assert!((400..480).contains(&caught_at), "{caught_at}");
     steps(&mut motor, 500, Driven);
-    // It was falling, and 400 of 2450 mN m are 3.3 counts.
+    // The joint was falling when it got torque. 400 of 2450 mN m are 3.3 counts of droop.
     assert!((1..=9).contains(&(caught_at - motor.position_counts())), "{}", motor.position_counts());
 }
 
@@ -249,7 +250,7 @@ fn a_stiff_wall_stops_a_motor_which_then_pushes() {
 
 #[test]
 fn a_soft_wall_gives_way_by_the_push() {
-    // 120 mN m for each count, as the servo has: 2450 mN m in 20.3 counts.
+    // 120 mN m per count, which is the stiffness of the servo: 2450 mN m in 20.3 counts.
     let mut motor = motor_at_a_wall(Some(120_657));
     motor.start(goal(540, 0, 300));
     steps(&mut motor, 2_000, Driven);

@@ -22,7 +22,7 @@ pub(super) fn factory_settings(id: u8) -> [u8; COUNT] {
     registers
 }
 
-/// The high byte of a two-byte value comes first. The versions are invented.
+/// The high byte of a two-byte value comes first. The versions are assumed.
 const FACTORY: [(u8, u8); 15] = [
     (register::FIRMWARE_VERSION, 1),
     (register::BYTE_ORDER, 1),

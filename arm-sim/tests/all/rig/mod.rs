@@ -1,7 +1,7 @@
 //! A plant with a clock, and the frames of a master.
 
 #![allow(clippy::indexing_slicing, clippy::unwrap_used)] // A panic is a failed test.
-#![allow(dead_code)] // Each test file uses its part.
+#![allow(dead_code)] // Each test file uses only a part of the rig.
 
 use arm_sim::plant::Plant;
 use arm_sim::servo::ServoConfig;
@@ -36,7 +36,7 @@ impl Rig {
         rig
     }
 
-    /// As [`Self::ready`], with torque. The goal of each joint is its position.
+    /// Like [`Self::ready`], with torque. The goal of each joint is its position.
     pub fn driven() -> Self {
         let mut rig = Self::ready();
         rig.all_goals(Joint::ALL.map(|joint| rig.counts(joint)));
@@ -126,7 +126,7 @@ impl Rig {
         std::array::from_fn(|joint| after[joint] - before[joint])
     }
 
-    /// No hand holds any joint.
+    /// Lets all joints go that a hand holds.
     pub fn let_go(&mut self) {
         Joint::ALL.into_iter().for_each(|joint| self.plant.let_go(joint));
     }

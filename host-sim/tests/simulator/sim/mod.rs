@@ -13,7 +13,7 @@ use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::process::{Pid, Signal, kill_process};
 use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 
-/// The time limit of all waits, for the slowest machine.
+/// The time limit of all waits: long enough for a slow and busy machine.
 const PATIENCE: Duration = Duration::from_secs(60);
 
 /// A running simulator. Dropping it kills the process.
@@ -37,7 +37,7 @@ pub(crate) fn refused(arguments: &[&str]) -> String {
     complaint(&mut command(tempfile::tempdir().unwrap().path(), arguments))
 }
 
-/// As [`refused`], for a command.
+/// Like [`refused`], for a command.
 pub(crate) fn complaint(command: &mut Command) -> String {
     let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     let status = wait(&mut child);
@@ -69,12 +69,12 @@ impl Sim {
         Self::spawn(child, state)
     }
 
-    /// As [`Self::start`], with this state directory.
+    /// Like [`Self::start`], with this state directory.
     pub(crate) fn start_in(state: &Path, arguments: &[&str]) -> Self {
         Self::spawn(command(state, arguments), tempfile::tempdir().unwrap())
     }
 
-    /// As [`Self::start`], with its standard error in a file, so that much output needs no reader.
+    /// Like [`Self::start`], with standard error in a file, so that a long log does not block the process.
     pub(crate) fn start_with_log(arguments: &[&str], log: &Path) -> Self {
         let state = tempfile::tempdir().unwrap();
         let command = command(state.path(), arguments);
@@ -105,7 +105,7 @@ impl Sim {
         kill_process(Pid::from_child(&self.child), signal).unwrap();
     }
 
-    /// Sends a signal and waits for the exit status; `None` if it was killed.
+    /// Sends a signal and waits for the exit status; `None` if the process was killed.
     pub(crate) fn end_with(&mut self, signal: Signal) -> Option<i32> {
         self.signal(signal);
         wait(&mut self.child)
@@ -128,7 +128,7 @@ impl Sim {
     }
 }
 
-/// Waits for something to become true.
+/// Waits until the condition holds. `what` names it in the error.
 #[track_caller]
 pub(crate) fn wait_until(what: &str, mut is_so: impl FnMut() -> bool) {
     let patience_ends = Instant::now() + PATIENCE;
@@ -155,7 +155,7 @@ impl Drop for Sim {
 pub(crate) struct Client {
     port: File,
     deframer: Deframer<ToHost>,
-    /// Received, and not yet taken by the deframer.
+    /// Received bytes that the deframer has not taken yet.
     received: Vec<u8>,
     start: Instant,
 }
@@ -187,7 +187,7 @@ impl Client {
         self.answer(address, count)
     }
 
-    /// The next answer from these registers; others, and what is left of one, are skipped.
+    /// The next answer from these registers. Other frames and partial frames are skipped.
     pub(crate) fn answer(&mut self, address: u8, count: u8) -> Vec<u8> {
         let patience_ends = Instant::now() + PATIENCE;
         loop {
@@ -204,7 +204,7 @@ impl Client {
         }
     }
 
-    /// Reads registers again and again until they hold these values.
+    /// Reads registers repeatedly until they hold these values.
     pub(crate) fn read_until(&mut self, address: u8, values: &[u8]) {
         let patience_ends = Instant::now() + PATIENCE;
         let count = u8::try_from(values.len()).unwrap();
@@ -218,7 +218,8 @@ impl Client {
         }
     }
 
-    /// Gives the deframer what waits, or the next bytes from the port, or the news that there are none.
+    /// Passes the received bytes to the deframer: those that wait, or the next ones from the port. No bytes tell it that the line
+    /// is idle.
     fn receive(&mut self) {
         if self.received.is_empty() && self.waits_readable() {
             let mut bytes = [0; 4_096];
@@ -253,7 +254,7 @@ impl Bus {
         tcsetattr(&self.0, OptionalActions::Now, &mode).unwrap();
     }
 
-    /// Everything that comes until it has been quiet for this long.
+    /// Receives bytes until none has come for this long.
     fn receive(&mut self, quiet: Duration) -> Vec<u8> {
         let mut received = Vec::new();
         let quiet = Timespec { tv_sec: 0, tv_nsec: quiet.as_nanos().try_into().unwrap() };
@@ -265,7 +266,7 @@ impl Bus {
         received
     }
 
-    /// Sends a frame, again and again until an answer of this length comes.
+    /// Sends a frame repeatedly until an answer of this length comes.
     pub(crate) fn ask(&mut self, frame: &[u8], length: usize) -> Vec<u8> {
         let patience_ends = Instant::now() + PATIENCE;
         loop {
@@ -278,13 +279,13 @@ impl Bus {
         }
     }
 
-    /// Pings a servo once, and takes everything that comes until it has been quiet for this long.
+    /// Pings a servo once, and receives bytes until none has come for this long.
     pub(crate) fn ping(&mut self, id: u8, quiet: Duration) -> Vec<u8> {
         self.0.write_all(&[0xFF, 0xFF, id, 2, 1, !(id + 3)]).unwrap();
         self.receive(quiet)
     }
 
-    /// Pings a servo until it answers: servos are deaf for a while after power-up.
+    /// Pings a servo until it answers: servos do not answer for a while after power-up.
     pub(crate) fn ping_until_answered(&mut self, id: u8) -> Vec<u8> {
         self.ask(&[0xFF, 0xFF, id, 2, 1, !(id + 3)], 6)
     }
