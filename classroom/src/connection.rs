@@ -1,6 +1,6 @@
-//! The name of a connection.
+//! The identity of a connection.
 
-/// A connection of a tab. Each has another number.
+/// Identifies the connection of a tab or of a teacher's screen. A class uses each number once.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct ConnectionId(u64);
 

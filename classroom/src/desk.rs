@@ -1,24 +1,24 @@
-//! A teacher's screen: what it has to be told.
+//! A teacher's screen: the messages that are due for it.
 
 use protocol_core::time::{Duration, Instant};
 
 use crate::message::{NotGiven, ToTeacher};
 
-/// Least time between two pictures of the class.
+/// The shortest time between two messages with the state of the class.
 const PERIOD: Duration = Duration::from_millis(100);
-/// Time between two of them while nothing happens: the time of a lease runs on.
+/// The time between two of these messages while nothing changes: the remaining time of a lease still does.
 const LONGEST_PERIOD: Duration = Duration::from_millis(500);
 
 #[derive(Debug, Default)]
 pub(crate) struct Desk {
     was_welcomed: bool,
     not_given: Option<NotGiven>,
-    /// The number of the last change that was shown, and when.
+    /// The number of the last change that was shown, and the time of that message.
     shown: Option<(u64, Instant)>,
 }
 
 impl Desk {
-    /// The real arm was not given.
+    /// Queues the reason why the real arm was not given.
     pub(crate) const fn refuse(&mut self, why: NotGiven) {
         self.not_given = Some(why);
     }
@@ -27,12 +27,12 @@ impl Desk {
         self.shown.is_none_or(|(shown, at)| now - at >= if shown == change { LONGEST_PERIOD } else { PERIOD })
     }
 
-    /// Has it to be told something?
+    /// True if a message is due.
     pub(crate) fn has_message(&self, now: Instant, change: u64) -> bool {
         !self.was_welcomed || self.not_given.is_some() || self.is_class_due(now, change)
     }
 
-    /// What it has to be told next. `change`: the number of the last change in the class.
+    /// The next message for the screen. `change` is the number of the last change in the class.
     pub(crate) fn next_message(
         &mut self,
         now: Instant,

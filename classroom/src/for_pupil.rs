@@ -1,12 +1,12 @@
-//! Parses what a pupil's tab gets. The page contains this, and has to be small: parsing by hand takes a third of the code that is
-//! derived from the types.
+//! Parses the messages to a pupil's tab. The page contains this parser and has to be small: the derived parser would take
+//! three times the code.
 
 use serde_json::{Map, Value};
 
 use crate::message::{LeaseEnd, LentArm, Refusal, ToPupil};
 
 impl ToPupil {
-    /// A message in JSON; `None` if it is none of these.
+    /// Parses a message in JSON; `None` if the text is not a message to a pupil.
     #[must_use]
     pub fn parse(text: &str) -> Option<Self> {
         let message: Value = serde_json::from_str(text).ok()?;

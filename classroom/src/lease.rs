@@ -2,10 +2,10 @@
 
 use protocol_core::time::{Duration, Instant};
 
-/// The longest time that a pupil can have the arm.
+/// The longest time that a pupil can have the arm, in seconds.
 const LONGEST: u32 = 3_600;
 
-/// A lease. Its number tells it from later ones.
+/// A lease. Its number distinguishes it from other leases.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Lease {
     pub(crate) number: u32,
@@ -14,7 +14,7 @@ pub(crate) struct Lease {
 }
 
 impl Lease {
-    /// From now on; `None` if it is for no time or for too long.
+    /// A lease that starts now; `None` if `seconds` is 0 or above [`LONGEST`].
     pub(crate) fn new(number: u32, pupil: u32, now: Instant, seconds: u32) -> Option<Self> {
         let time = Duration::from_millis(u64::from(seconds) * 1_000);
         (1..=LONGEST).contains(&seconds).then(|| Self { number, pupil, until: now + time })
@@ -24,7 +24,7 @@ impl Lease {
         self.until <= now
     }
 
-    /// What is left, in seconds: 1 until the end.
+    /// The remaining time in seconds, rounded up.
     pub(crate) fn seconds(&self, now: Instant) -> u32 {
         u32::try_from((self.until - now).as_micros().div_ceil(1_000_000)).unwrap_or(u32::MAX)
     }

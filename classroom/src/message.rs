@@ -1,17 +1,18 @@
-//! The messages of a class, as JSON. What a pupil sends has bounded types: nothing of it reaches the teacher unread.
+//! The messages of a class, as JSON. A pupil's messages have bounded types: the class parses them before it passes their
+//! content to the teacher.
 
 use serde::{Deserialize, Serialize};
 
-/// The points of the arm in a [`Report`]: shoulder, elbow, begin of the forearm, wrist, tip.
+/// The number of points of the arm in a [`Report`]: shoulder, elbow, start of the forearm, wrist, tip.
 pub const POINTS: usize = 5;
 /// The longest message of the teacher to all, in characters.
 pub const LONGEST_TEXT: usize = 280;
 
-/// What a pupil's tab sends.
+/// A message from a pupil's tab.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FromPupil {
-    /// The first message: who it is.
+    /// The first message: the tab asks to join the class.
     Join {
         /// The name that the pupil typed.
         name: String,
@@ -45,11 +46,11 @@ impl FromPupil {
 pub struct Report {
     /// x, y, z in mm, see [`POINTS`]; `None` while the arm is not measured.
     pub points: Option<[[i16; 3]; POINTS]>,
-    /// In a word.
+    /// Its state in one word.
     pub doing: Doing,
-    /// The exercise that was begun.
+    /// The goals of the exercise in progress; `None` without an exercise.
     pub goals: Option<Goals>,
-    /// The tab is in the background: a simulated arm stands still there.
+    /// True if the tab is in the background, where a simulated arm stands still.
     pub is_hidden: bool,
 }
 
@@ -69,11 +70,11 @@ pub enum Doing {
     Playing,
     /// It is being parked.
     Parking,
-    /// A stop is on its way.
+    /// A stop was sent and is not confirmed yet.
     Stopping,
     /// A stop has been confirmed, and nothing moved it since.
     Stopped,
-    /// It did not take a stop.
+    /// It did not confirm a stop.
     StopFailed,
     /// Its motors are off or damped.
     Limp,
@@ -86,9 +87,9 @@ pub enum Doing {
 /// The goals of an exercise.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Goals {
-    /// How many are reached.
+    /// The number of goals that are reached.
     pub reached: u8,
-    /// How many there are.
+    /// The number of all goals.
     pub all: u8,
 }
 
@@ -102,34 +103,34 @@ pub enum StopOutcome {
     Limp,
 }
 
-/// What a pupil's tab gets.
+/// A message to a pupil's tab.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ToPupil {
     /// The tab is in the class.
     Welcome {
-        /// The name in the class. It differs from the wanted one if another pupil has that.
+        /// The name in the class. It differs from the requested name if another pupil has that one.
         name: String,
-        /// A secret of this tab: it keeps its place with it, and reaches the real arm while it has it.
+        /// A secret of this tab. With it the tab keeps its place in the class, and reaches the real arm during its lease.
         key: String,
     },
     /// The tab is not in the class. The server closes the connection.
     Refused(Refusal),
-    /// Stop the arm of this tab, before everything else. It comes again until [`FromPupil::Stopped`].
+    /// Stop the arm of this tab, before everything else. The class repeats this message until [`FromPupil::Stopped`].
     Stop {
-        /// Which stop.
+        /// The number of the stop.
         number: u32,
     },
-    /// A message of the teacher; an empty one takes the last one back.
+    /// A message of the teacher; an empty text removes the last message.
     Message {
         /// The text.
         text: String,
     },
-    /// How does the arm do? Answered by [`FromPupil::Report`].
+    /// Asks for a [`FromPupil::Report`], and tells who has the real arm.
     Ask {
-        /// Who has the real arm.
+        /// The lease of the real arm; `None` if no pupil has it.
         arm: Option<LentArm>,
-        /// This tab had the real arm before this message, and has it no longer.
+        /// Why this tab no longer has the real arm; `None` unless its lease has ended since the last question.
         over: Option<LeaseEnd>,
     },
 }
@@ -144,22 +145,22 @@ pub enum Refusal {
     Full,
     /// The same pupil has joined in another tab.
     OtherTab,
-    /// A message was none of these.
+    /// A message was not valid, or the tab did not join within 10 s.
     BadMessage,
 }
 
 /// The real arm, while a pupil has it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct LentArm {
-    /// Who has it.
+    /// The name of the pupil who has it.
     pub holder: String,
-    /// For how long from now, in seconds.
+    /// The remaining time in seconds.
     pub seconds: u32,
-    /// The tab that gets this message has it.
+    /// True if the tab that gets this message has it.
     pub is_yours: bool,
 }
 
-/// Why a pupil has the real arm no longer.
+/// Why a pupil no longer has the real arm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LeaseEnd {
@@ -167,33 +168,33 @@ pub enum LeaseEnd {
     Time,
     /// The teacher took it back, or gave it to another pupil.
     TakenBack,
-    /// The connection of the tab was lost.
+    /// The connection of the tab was lost, the tab did not answer for 8 s, or the pupil joined in another tab.
     Lost,
 }
 
-/// What the teacher's screen sends.
+/// A message from a teacher's screen.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FromTeacher {
-    /// All arms stop.
+    /// Stops all arms.
     StopAll,
-    /// A message to all; an empty one takes the last one back.
+    /// A message to all; an empty text removes the last message.
     Say {
         /// The text, cut after [`LONGEST_TEXT`] characters.
         text: String,
     },
-    /// Gives the real arm to a pupil. Who has it loses it.
+    /// Gives the real arm to a pupil. Another pupil who has it loses it.
     Give {
         /// The number of the pupil.
         pupil: u32,
-        /// For how long: 1 to 3600 s.
+        /// The time of the lease: 1 to 3600 s.
         seconds: u32,
     },
     /// Takes the real arm back.
     TakeBack,
 }
 
-/// What the teacher's screen gets.
+/// A message to a teacher's screen.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ToTeacher {
@@ -201,7 +202,7 @@ pub enum ToTeacher {
     Welcome {
         /// The addresses that pupils open.
         addresses: Vec<String>,
-        /// What they have to type, if something.
+        /// The code that pupils have to type; `None` if there is none.
         code: Option<String>,
         /// Does the class have a real arm?
         has_arm: bool,
@@ -224,16 +225,16 @@ pub enum NotGiven {
     ArmSilent,
     /// The pupil is not connected.
     PupilGone,
-    /// Not 1 to 3600 s.
+    /// The time is not 1 to 3600 s.
     BadTime,
 }
 
-/// The class.
+/// The state of the class.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ClassNews {
-    /// In the order in which they joined.
+    /// The pupils, in the order in which they joined.
     pub pupils: Vec<Tile>,
-    /// The last stop for all.
+    /// The last stop for all; `None` before the first.
     pub stop: Option<StopNews>,
     /// The real arm; `None` if the class has none.
     pub arm: Option<ArmTile>,
@@ -246,17 +247,17 @@ pub struct ClassNews {
 pub struct Tile {
     /// The number of the pupil.
     pub pupil: u32,
-    /// To be shown as text.
+    /// The name of the pupil. Show it as text, not as HTML.
     pub name: String,
     /// Is the tab connected, and does it answer?
     pub presence: Presence,
-    /// What its arm did last.
+    /// The last report of the tab; `None` before the first.
     pub report: Option<Report>,
-    /// What the tab says of the last stop for all; `None` if it was not asked.
+    /// The state of the last stop for all in this tab; `None` if the tab was not asked.
     pub stop: Option<TileStop>,
 }
 
-/// Is a tab there?
+/// Whether a tab is connected and answers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Presence {
@@ -268,7 +269,7 @@ pub enum Presence {
     Lost,
 }
 
-/// What a tab, or the real arm, says of the last stop for all.
+/// The state of a stop in one tab, or at the real arm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum TileStop {
@@ -289,16 +290,16 @@ impl From<StopOutcome> for TileStop {
     }
 }
 
-/// How far the last stop for all has come. The real arm counts as one.
+/// The progress of the last stop for all. The real arm counts as one arm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StopNews {
-    /// Which stop.
+    /// The number of the stop.
     pub number: u32,
-    /// How many arms were to stop.
+    /// The number of arms that were asked to stop.
     pub asked: usize,
-    /// How many have confirmed it.
+    /// The number of arms that have confirmed it.
     pub confirmed: usize,
-    /// From the teacher's message to the last confirmation so far, in milliseconds.
+    /// The time from the teacher's message to the last confirmation so far, in milliseconds.
     pub millis: u64,
 }
 
@@ -307,10 +308,10 @@ pub struct StopNews {
 pub struct ArmTile {
     /// Does it answer?
     pub answers: bool,
-    /// What it did with the last stop for all, or at the end of the last lease.
+    /// Whether it has confirmed the last hold: after a stop for all, a stop by a pupil, or the end of a lease.
     pub stop: Option<TileStop>,
-    /// The pupil who has it.
+    /// The number of the pupil who has it.
     pub holder: Option<u32>,
-    /// For how long from now, in seconds; 0 if nobody has it.
+    /// The remaining time of the lease in seconds; 0 without a lease.
     pub seconds: u32,
 }

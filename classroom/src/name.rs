@@ -3,14 +3,15 @@
 /// The longest name, in characters.
 pub const LONGEST_NAME: usize = 24;
 
-/// Characters that are not shown, or that turn the direction of the text around them.
+/// True for characters that are not shown, or that change the direction of the text around them.
 const fn is_invisible(character: char) -> bool {
     matches!(character, '\u{ad}' | '\u{34f}' | '\u{61c}' | '\u{115f}' | '\u{1160}' | '\u{180b}'..='\u{180f}'
         | '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{2800}' | '\u{3164}'
         | '\u{fe00}'..='\u{fe0f}' | '\u{feff}' | '\u{ffa0}' | '\u{fff9}'..='\u{fffb}' | '\u{e0000}'..='\u{e007f}')
 }
 
-/// The name in a text: one line without spaces at its ends, cut after [`LONGEST_NAME`] characters. `None` without any letter or digit.
+/// The name in a text: one line without spaces at its ends, cut after [`LONGEST_NAME`] characters. `None` if it has no letter
+/// and no digit.
 ///
 /// ```
 /// use classroom::name::clean;
@@ -31,7 +32,7 @@ fn cut(text: &str, most: usize) -> String {
     text.chars().take(most).collect::<String>().trim_end().to_owned()
 }
 
-/// The name, or with the first number behind it that makes it unique: `Mia 2`.
+/// The name if it is free; otherwise the name with the lowest number that makes it unique: `Mia 2`.
 pub(crate) fn unique(name: &str, is_taken: impl Fn(&str) -> bool) -> String {
     let numbered = (2..).map(|number: u32| {
         let number = format!(" {number}");
@@ -41,7 +42,7 @@ pub(crate) fn unique(name: &str, is_taken: impl Fn(&str) -> bool) -> String {
     std::iter::once(name.to_owned()).chain(numbered).find(is_free).unwrap_or_else(|| name.to_owned())
 }
 
-/// Are they the same name? Capitals make no difference.
+/// True if both names are the same in lower case.
 pub(crate) fn is_same(one: &str, other: &str) -> bool {
     one.to_lowercase() == other.to_lowercase()
 }

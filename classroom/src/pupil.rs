@@ -1,4 +1,4 @@
-//! A pupil: the tab that is connected or was, what it said last, and what it has to be told.
+//! A pupil: the present or last connection of its tab, the last report, and the messages that are due.
 
 use protocol_core::time::{Duration, Instant};
 
@@ -8,7 +8,7 @@ use crate::stop_all::PendingStop;
 
 /// Time between two questions to a tab that answers.
 const ASK_PERIOD: Duration = Duration::from_millis(250);
-/// A tab that does not answer is asked again after this time. It takes a silence of 10 s for a dead connection.
+/// A tab that does not answer is asked again after this time. The tab takes a silence of 10 s for a dead connection.
 const ASK_AGAIN: Duration = Duration::from_millis(4_000);
 /// A tab that has not answered for this long counts as silent.
 const SILENT: Duration = Duration::from_millis(8_000);
@@ -27,10 +27,10 @@ pub(crate) struct Pupil {
     answered: Instant,
     is_ask_due: bool,
     waits_for_answer: bool,
-    /// It had the real arm, and was not told yet why no longer.
+    /// Why the lease of the pupil ended, until the tab is told.
     over: Option<LeaseEnd>,
     pub(crate) stop: Option<PendingStop>,
-    /// The number of the last message of the teacher that it got.
+    /// The number of the last teacher's message that the tab got.
     message_seen: u32,
 }
 
@@ -53,7 +53,7 @@ impl Pupil {
         }
     }
 
-    /// The same pupil in a new connection. Returns the one before, if it is still open.
+    /// Moves the pupil to a new connection. Returns the old connection if it is still open.
     pub(crate) fn rejoin(
         &mut self,
         now: Instant,
@@ -75,7 +75,7 @@ impl Pupil {
         (self.connection, self.lost) = (None, now);
     }
 
-    /// For how long has it been gone? `None` if it is connected.
+    /// The time since the connection was lost; `None` while the tab is connected.
     pub(crate) fn lost_for(&self, now: Instant) -> Option<Duration> {
         self.connection.is_none().then(|| now - self.lost)
     }
@@ -88,12 +88,12 @@ impl Pupil {
         }
     }
 
-    /// It is to be asked, and told who has the real arm, at once.
+    /// Makes a question due at once, which also tells who has the real arm.
     pub(crate) const fn ask(&mut self) {
         self.is_ask_due = true;
     }
 
-    /// It has the real arm no longer.
+    /// Records why the pupil no longer has the real arm.
     pub(crate) const fn end_lease(&mut self, why: LeaseEnd) {
         self.over = Some(why);
     }
@@ -106,19 +106,19 @@ impl Pupil {
         self.stop.as_mut().is_some_and(|stop| stop.confirm(number, outcome))
     }
 
-    /// Time passes.
+    /// Makes the next question due if it is time for it.
     pub(crate) fn poll(&mut self, now: Instant) {
         let since = now - self.asked;
         self.is_ask_due |= since >= if self.waits_for_answer { ASK_AGAIN } else { ASK_PERIOD };
     }
 
-    /// Has it to be told something? `message`: the number of the teacher's last message.
+    /// True if a message is due. `message` is the number of the teacher's last message.
     pub(crate) fn has_message(&self, now: Instant, message: u32) -> bool {
         let is_stop_due = self.stop.is_some_and(|stop| stop.is_due(now));
         is_stop_due || self.is_welcome_due || self.message_seen != message || self.is_ask_due
     }
 
-    /// What it has to be told next: a stop before everything else.
+    /// The next message for the tab: a stop before everything else.
     pub(crate) fn next_message(
         &mut self,
         now: Instant,

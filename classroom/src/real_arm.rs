@@ -6,18 +6,18 @@ use crate::lease::Lease;
 use crate::message::{ArmTile, NotGiven, StopOutcome, TileStop};
 use crate::stop_all::PendingStop;
 
-/// What the real arm does.
+/// The state of the real arm, as its caller sees it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ArmNews {
     /// It answers.
     pub answers: bool,
-    /// What is sent to it may reach it, although it perhaps does not answer.
+    /// Requests may reach it, even if it does not answer.
     pub may_hear: bool,
-    /// It is being held.
+    /// A hold is in progress.
     pub is_holding: bool,
     /// It has confirmed the last hold.
     pub holds: bool,
-    /// Its motors were off then.
+    /// Its motors were off when it confirmed the hold.
     pub is_limp: bool,
 }
 
@@ -26,25 +26,25 @@ pub struct ArmNews {
 pub(crate) struct RealArm {
     news: ArmNews,
     hold: Option<PendingStop>,
-    /// What it says of the last stop for all.
+    /// The state of the last stop for all at this arm; `None` before the first.
     pub(crate) stop: Option<TileStop>,
     lease: Option<Lease>,
     leases: u32,
 }
 
 impl RealArm {
-    /// It has to hold where it is.
+    /// Requests that the arm holds its position.
     pub(crate) const fn hold(&mut self, now: Instant) {
         self.hold = Some(PendingStop::new(0, now));
     }
 
-    /// It has to hold because all stop.
+    /// Requests a hold because of a stop for all.
     pub(crate) const fn stop(&mut self, now: Instant) {
         self.stop = Some(TileStop::Asked);
         self.hold(now);
     }
 
-    /// A lease from now on.
+    /// A lease that starts now. The arm is not lent yet.
     pub(crate) fn new_lease(&mut self, now: Instant, pupil: u32, seconds: u32) -> Result<Lease, NotGiven> {
         let lease = Lease::new(self.leases + 1, pupil, now, seconds).ok_or(NotGiven::BadTime)?;
         self.leases += 1;
@@ -59,14 +59,14 @@ impl RealArm {
         self.lease
     }
 
-    /// Nobody has it from now on, and it has to hold. Returns who had it.
+    /// Ends the lease, and requests a hold. Returns the pupil who had the arm.
     pub(crate) fn take_back(&mut self, now: Instant) -> Option<u32> {
         let lease = self.lease.take()?;
         self.hold(now);
         Some(lease.pupil)
     }
 
-    /// Has it to be held now? It is, from then on.
+    /// True if a hold has to start now. From then on it counts as in progress.
     pub(crate) fn take_hold(&mut self, now: Instant) -> bool {
         let ArmNews { may_hear, is_holding, .. } = self.news;
         // A new stop does not wait for the end of an older one.
@@ -78,11 +78,11 @@ impl RealArm {
         true
     }
 
-    /// Returns whether there is something new, and whether it confirms the stop for all.
+    /// Takes news of the arm. Returns whether they differ from the last ones, and whether they confirm the stop for all.
     pub(crate) fn take_news(&mut self, news: ArmNews) -> (bool, bool) {
         let is_new = self.news != news;
         self.news = news;
-        // What came before the hold was sent says nothing of it.
+        // News from before the hold was sent do not confirm it.
         let Some(hold) = self.hold.as_mut().filter(|hold| is_new && news.holds && hold.was_sent) else {
             return (is_new, false);
         };

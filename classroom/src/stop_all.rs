@@ -4,14 +4,14 @@ use protocol_core::time::{Duration, Instant};
 
 use crate::message::{StopNews, StopOutcome, TileStop};
 
-/// An arm that has not confirmed is told again after this time.
+/// A stop that an arm has not confirmed is sent again after this time.
 const REPEAT: Duration = Duration::from_millis(100);
 
 /// A stop on its way to one arm.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PendingStop {
     pub(crate) number: u32,
-    /// When it has to be sent.
+    /// The time at which it has to be sent next.
     due: Instant,
     pub(crate) was_sent: bool,
     outcome: Option<StopOutcome>,
@@ -22,22 +22,22 @@ impl PendingStop {
         Self { number, due: now, was_sent: false, outcome: None }
     }
 
-    /// Has it to be sent now?
+    /// True if it has to be sent now.
     pub(crate) fn is_due(&self, now: Instant) -> bool {
         self.outcome.is_none() && self.due <= now
     }
 
-    /// It was sent.
+    /// Records that it was sent. It is due again after [`REPEAT`].
     pub(crate) fn sent(&mut self, now: Instant) {
         (self.due, self.was_sent) = (now + REPEAT, true);
     }
 
-    /// A new connection has to be told at once.
+    /// Makes it due at once, because the tab has a new connection.
     pub(crate) const fn send_again(&mut self, now: Instant) {
         self.due = now;
     }
 
-    /// The arm confirms. Returns whether that is news.
+    /// Takes a confirmation. Returns true for the first one of this stop.
     pub(crate) fn confirm(&mut self, number: u32, outcome: StopOutcome) -> bool {
         let is_news = number == self.number && self.outcome.is_none();
         if is_news {
@@ -64,12 +64,12 @@ impl StopAll {
         Self { number, began: now, last_confirmed: now }
     }
 
-    /// An arm has confirmed.
+    /// Records the time of a confirmation.
     pub(crate) const fn note_confirmed(&mut self, now: Instant) {
         self.last_confirmed = now;
     }
 
-    /// What came of it, from what each arm says.
+    /// The progress of the stop, from the state of each arm.
     pub(crate) fn news(&self, arms: impl Iterator<Item = TileStop>) -> StopNews {
         let count = |(asked, confirmed), arm| (asked + 1, confirmed + usize::from(arm != TileStop::Asked));
         let (asked, confirmed) = arms.fold((0, 0), count);

@@ -102,7 +102,7 @@ impl Lesson {
         self.order(&FromTeacher::Give { pupil, seconds });
     }
 
-    /// The real arm is held as soon as the class wants it.
+    /// Takes the hold that is due, and confirms it.
     fn hold(&mut self) {
         assert!(self.class.take_hold(self.now), "the arm is to be held");
         assert!(!self.class.take_hold(self.now), "it is being held");
@@ -114,7 +114,7 @@ fn stopped(number: u32) -> FromPupil {
     FromPupil::Stopped { number, outcome: StopOutcome::Holds }
 }
 
-/// Why the lease of a pupil is over, in what it was told.
+/// The end of a lease among the messages to a pupil.
 fn over(told: &[ToPupil]) -> Option<LeaseEnd> {
     told.iter().find_map(|message| if let ToPupil::Ask { over, .. } = message { *over } else { None })
 }
@@ -240,7 +240,7 @@ fn a_pupil_whose_connection_was_lost_is_stopped_when_it_comes_back() {
     assert_eq!(lesson.tile("Mia").stop, Some(TileStop::Asked));
     let again = lesson.join_with("Mia", Some("key 1"));
     assert_eq!(lesson.told(again), Some(ToPupil::Stop { number: 1 }));
-    // Who joins later was not asked.
+    // A pupil who joins later is not asked.
     lesson.join("Leo");
     assert_eq!(lesson.tile("Leo").stop, None);
 }
@@ -399,7 +399,7 @@ fn the_real_arm_counts_in_a_stop_and_is_held_until_it_confirms() {
     lesson.class.arm_news(lesson.now, ANSWERS);
     lesson.hold();
     assert_eq!(lesson.shown().stop.map(|stop| (stop.asked, stop.confirmed)), Some((2, 2)));
-    // A later lease, and a stop of a pupil, do not change what came of the stop for all.
+    // A later lease, and a stop of a pupil, do not change the progress of the stop for all.
     lesson.give("Mia", 60);
     lesson.say(mia, &FromPupil::StopArm);
     assert_eq!(lesson.shown().arm.unwrap().stop, Some(TileStop::Asked));
@@ -475,12 +475,12 @@ fn deed() -> impl Strategy<Value = Deed> {
 }
 
 proptest! {
-    /// Whatever happens: names stay unique, only a pupil who is there has the arm, a lease that ends is followed by a hold, and in
-    /// the end a stop reaches every tab that answers.
+    /// Whatever happens, names stay unique, only a pupil who is there has the arm, and a hold follows the end of each lease.
+    /// In the end a stop reaches every tab that answers.
     #[test]
     fn a_class_survives_everything(deeds in prop::collection::vec(deed(), 0..120)) {
         let mut lesson = Lesson::new(true);
-        // Of an old tab nobody knows that it is open still.
+        // `old` holds tabs that were replaced and are still open.
         let (mut tabs, mut old) = ([None; 8], Vec::new());
         for deed in deeds {
             let lease = lesson.class.lease();

@@ -1,7 +1,7 @@
 //! Messages as bytes, in the encoding of ROS 2: CDR, with four bytes before it that name the byte order.
 //!
 //! ```text
-//!   00 01 00 00   CDR, little-endian, and options, which may name the bytes that fill up the end
+//!   00 01 00 00   CDR, little-endian, and options, which may give the number of padding bytes at the end
 //!   ...           the fields, each aligned to its size, counted from here
 //! ```
 
@@ -19,7 +19,7 @@ pub(crate) fn encode(message: &impl Serialize) -> Result<Vec<u8>, cdr_encoding::
     Ok(bytes)
 }
 
-/// A message from its bytes; `None` if they are not one.
+/// Decodes a message; `None` if the bytes are not such a message.
 pub(crate) fn decode<'a, M: Deserialize<'a>>(bytes: &'a [u8]) -> Option<M> {
     let (order, body) = bytes.split_first_chunk()?;
     let body = body.get(NO_OPTIONS.len()..)?;
@@ -39,7 +39,7 @@ mod tests {
     const BYTES: &[&[u8]] = &[
         &[0, 1, 0, 0],
         &[1, 0, 0, 0, 0, 0x65, 0xCD, 0x1D],
-        // A text has its length with the 0 at its end. The next number is aligned.
+        // A text begins with its length, which includes the 0 at its end. The next number is aligned.
         &[1, 0, 0, 0, 0, 0, 0, 0],
         &[2, 0, 0, 0, 2, 0, 0, 0, b'a', 0, 0, 0, 3, 0, 0, 0, b'b', b'c', 0, 0],
         &[2, 0, 0, 0],

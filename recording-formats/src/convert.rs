@@ -11,11 +11,11 @@ use crate::read_error::ReadError;
 use crate::write::write;
 use crate::writer::{io_error, options};
 
-/// Reads a recording, and writes it in a format. From MCAP to MCAP all messages are copied, also those of other topics, and a
-/// file that is cut off gets an end and an index.
+/// Reads a recording, and writes it in a format. From MCAP to MCAP all messages are copied, also of other topics, and a file
+/// that is cut off gets an end and an index.
 ///
 /// # Errors
-/// The errors of [`crate::read`], or the output cannot be written. At [`ReadError::Damaged`] what can be read has been written.
+/// The errors of [`crate::read`], or the output cannot be written. With [`ReadError::Damaged`], the readable part was written.
 pub fn convert(source: impl Read, format: Format, mut out: impl Write) -> Result<Recording, ReadError> {
     let mut copy = Vec::new();
     let mut writer = options().create(NoSeek::new(&mut copy)).map_err(io_error)?;

@@ -10,16 +10,16 @@ use sevenbot::recording::{FileVersion, Recording, RecordingError, head};
 /// The names of the columns. Angles are degrees of the arm; vacuum is 1 while the pump sucks.
 pub(crate) const COLUMNS: &str = "seconds,joint_1,joint_2,joint_3,joint_4,joint_5,joint_6,joint_7,vacuum";
 
-/// Is this the first line of such a file?
+/// Is this the first line of a recording as CSV?
 pub(crate) fn is_head(line: &str) -> bool {
     let names = line.trim_start_matches('\u{feff}').trim().split(',').map(str::trim);
     names.eq(COLUMNS.split(','))
 }
 
-/// A recording from the lines after the first. Its errors name the lines of this file.
+/// Parses the lines after the first. Errors have the line numbers of the CSV file.
 pub(crate) fn parse(text: &str) -> Result<Recording, RecordingError> {
     let (_, lines) = text.split_once('\n').unwrap_or((text, ""));
-    // One line in the place of the names of the columns.
+    // One line replaces the names of the columns, so that the line numbers stay the same.
     let head = head(FileVersion::Hundredths);
     let head = head.lines().next().unwrap_or_default();
     Recording::parse(&format!("{head}\n{}", lines.replace(',', " ")))

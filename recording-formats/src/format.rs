@@ -1,4 +1,4 @@
-//! The formats, and the ends of the names of their files.
+//! The formats, and their file name extensions.
 
 use std::path::Path;
 
@@ -12,7 +12,7 @@ use std::path::Path;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
-    /// That of `sevenbot record`: [`sevenbot::recording`].
+    /// The text format of `sevenbot record`: [`sevenbot::recording`].
     Text,
     /// Values with commas, in degrees.
     Csv,
@@ -24,7 +24,7 @@ impl Format {
     /// All formats.
     pub const ALL: [Self; 3] = [Self::Text, Self::Csv, Self::Mcap];
 
-    /// The end of the names of its files, without the dot.
+    /// Its file name extension, without the dot.
     #[must_use]
     pub const fn extension(self) -> &'static str {
         match self {
@@ -34,7 +34,7 @@ impl Format {
         }
     }
 
-    /// The format that the end of a file's name tells.
+    /// The format with the extension of this file name, in upper or lower case; `None` for any other extension.
     #[must_use]
     pub fn of_name(path: &Path) -> Option<Self> {
         let end = path.extension()?.to_str()?;

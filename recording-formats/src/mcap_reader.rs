@@ -1,6 +1,6 @@
-//! Reads a recording from an MCAP file: one of this program, or a bag of `ros/sevenbot_ros`.
+//! Reads a recording from an MCAP file of this crate, or from a bag of `ros/sevenbot_ros`.
 //!
-//! A file without an end is read as far as it goes.
+//! A file that is cut off is read as far as its records are complete.
 
 use std::collections::BTreeMap;
 use std::io::{self, Read};
@@ -24,7 +24,7 @@ const LONGEST_RECORD: usize = 64 * 1_024 * 1_024;
 const STATES: [&str; 2] = ["joint_states", "robot_joint_states"];
 /// The last word of the topic with the state of the pump.
 const VACUUM: &str = "vacuum";
-/// The times of a recording are milliseconds.
+/// The resolution of the times of a recording. A moment that comes less than this after the one before is skipped.
 const RESOLUTION: Duration = Duration::from_millis(1);
 
 /// Reads the recording, and passes each message on.
@@ -74,7 +74,7 @@ struct Tracks {
 struct Track {
     /// The time of the first moment, since 1970.
     start: Duration,
-    /// Its time in the recording.
+    /// The time of the first moment in the recording.
     first_time: Duration,
     moments: Vec<Moment>,
 }
@@ -101,7 +101,7 @@ impl Tracks {
         track.add(time, positions, self.vacuum)
     }
 
-    /// That of the preferred topic.
+    /// The recording from the preferred topic.
     fn recording(self) -> Result<Recording, McapReadError> {
         let preferred = |word: &str| -> Vec<String> {
             self.by_topic.keys().filter(|topic| last_word(topic) == word).cloned().collect()

@@ -1,6 +1,6 @@
 //! The messages of ROS 2 that a recording has: their fields, and their definitions as text for readers without ROS.
 //!
-//! Field order is that of the published interfaces, because CDR has no names.
+//! The fields have the order of the published interfaces, because CDR does not encode names.
 
 use std::time::Duration;
 
@@ -33,7 +33,7 @@ macro_rules! header {
 pub(crate) trait RosMessage: Serialize {
     /// The name of the interface.
     const NAME: &'static str;
-    /// The interface, and below it those that it uses.
+    /// The definition of the interface, followed by the definitions of the interfaces that it uses.
     const DEFINITION: &'static str;
 }
 
@@ -87,7 +87,7 @@ impl RosMessage for JointState {
 /// `geometry_msgs/msg/TransformStamped`, with the fields of its parts in their order.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct Transform {
-    /// Its frame is the parent.
+    /// The frame of the header is the parent.
     pub(crate) header: Header,
     pub(crate) child_frame_id: &'static str,
     /// In m.

@@ -1,6 +1,6 @@
-//! Reads a recording in any format, which its first bytes tell.
+//! Reads a recording in any format. The first bytes determine the format.
 //!
-//! Input is bounded, so that a wrong path such as a device fills no memory.
+//! The input is bounded, so that a wrong path, such as a device, does not fill the memory.
 
 use std::io::{self, Read};
 
@@ -10,7 +10,7 @@ use sevenbot::recording::{Recording, RecordingError};
 use crate::read_error::{LONGEST_TEXT, ReadError};
 use crate::{csv, mcap_reader};
 
-/// The start of a text is checked before the rest is read.
+/// This many bytes of a text are checked before the rest is read.
 const START: u64 = 64 * 1_024;
 
 /// Reads a recording: text, CSV or MCAP.
@@ -23,7 +23,7 @@ const START: u64 = 64 * 1_024;
 /// ```
 ///
 /// # Errors
-/// The source cannot be read, or is no whole recording. [`ReadError::Damaged`] has what can be read.
+/// The source cannot be read, or is not a whole recording. [`ReadError::Damaged`] contains the part that can be read.
 pub fn read(source: impl Read) -> Result<Recording, ReadError> {
     read_and_pass_on(source, |_| Ok(()))
 }

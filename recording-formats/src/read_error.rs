@@ -1,14 +1,14 @@
-//! Why a file is no recording.
+//! The reasons why a file is not a recording.
 
 use std::io;
 
 use sevenbot::Joint;
 use sevenbot::recording::{Recording, RecordingError};
 
-/// More than a day of 50 moments a second, in bytes of the text format.
+/// The bound on a text in bytes: more than a day of 50 moments a second.
 pub(crate) const LONGEST_TEXT: u64 = 512 * 1_024 * 1_024;
 
-/// Why there is no recording, or no whole one.
+/// Why a source is not a recording, or not a whole one.
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {
     /// The source cannot be read.
@@ -17,7 +17,7 @@ pub enum ReadError {
     /// The text is too long for a recording.
     #[error("this is longer than {LONGEST_TEXT} bytes: is it the right file?")]
     TooLong,
-    /// The first bytes are those of a text, but the rest is not.
+    /// The source is neither MCAP nor text in UTF-8.
     #[error("this is not text in UTF-8")]
     NotText,
     /// The text is refused.
@@ -29,9 +29,9 @@ pub enum ReadError {
     /// The MCAP file is cut off or damaged.
     #[error("{cause}; {} moments, {:.1} s, can be read", .readable.moments().count(), .readable.duration().as_secs_f64())]
     Damaged {
-        /// What can be read: of a file that is cut off, all that is there.
+        /// The part that can be read: all complete records of a file that is cut off.
         readable: Recording,
-        /// What is wrong, and where.
+        /// What is wrong with the file.
         cause: String,
     },
 }
@@ -55,7 +55,7 @@ pub enum McapReadError {
     OutOfRange {
         /// The joint.
         joint: Joint,
-        /// Its angle, as the registers have it.
+        /// Its angle in degrees of the registers.
         degrees: f64,
         /// The time in the file, since its first moment.
         seconds: f64,

@@ -1,13 +1,13 @@
-//! What an arm tells besides its pose, while it is recorded.
+//! The values that an arm reports besides its pose, while it is recorded.
 
 use sevenbot::FineAngle;
 
-/// What an arm tells besides its pose. A value is `None` where the firmware does not tell it.
+/// The values that an arm reports besides its pose. A value is `None` if the firmware does not report it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Telemetry {
-    /// Where the joints are sent, joint 1 first.
+    /// The target positions, joint 1 first.
     pub targets: Option<[FineAngle; 7]>,
-    /// How they move.
+    /// The velocities and loads.
     pub motion: Option<JointMotion>,
 }
 

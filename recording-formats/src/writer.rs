@@ -6,7 +6,8 @@
 //!   the model, once ────▶ /robot_description, /tf_static ─────────────────────┘
 //! ```
 //!
-//! Nothing is sought, so the output may be a pipe. A file that a kill cuts off has whole chunks, which readers recover.
+//! The writer never seeks, so the output may be a pipe. If the program is killed, the file has whole chunks, which readers
+//! recover.
 
 use std::collections::HashMap;
 use std::io::{self, Write};
@@ -27,9 +28,9 @@ use crate::messages::{
 use crate::telemetry::Telemetry;
 use crate::topics;
 
-/// How much is written at once, so at most this much is lost if the program is killed.
+/// The time of the recording that is written at once. At most this much is lost if the program is killed.
 const CHUNK: Duration = Duration::from_secs(1);
-/// What URDF demands as the greatest torque, in N m; the stall torque of the servos is not measured.
+/// The greatest torque in the URDF, in N m. It stands for the stall torque of the servos, which is not measured.
 const STALL_TORQUE: f64 = 2.0;
 
 /// How messages go to the output.
@@ -101,8 +102,8 @@ impl<W: Write> McapWriter<W> {
         })
     }
 
-    /// Adds a moment, not earlier than the one before. `at`: its time since 1970, which the file has in the place of its own. Of its
-    /// own times the file has that of the first moment.
+    /// Adds a moment, not earlier than the one before. `at` is its time since 1970. The file has this time instead of
+    /// [`Moment::time`], which it keeps only for the first moment.
     ///
     /// # Errors
     /// The output cannot be written. The file then ends with the moments of [`McapWriter::written`].
@@ -123,7 +124,7 @@ impl<W: Write> McapWriter<W> {
         self.end_chunk(at)
     }
 
-    /// Adds the health of the arm at this port, `at` a time since 1970.
+    /// Adds the health of the arm at this port. `at` is a time since 1970.
     ///
     /// # Errors
     /// The output cannot be written.
@@ -132,7 +133,7 @@ impl<W: Write> McapWriter<W> {
         self.publish(topics::DIAGNOSTICS, at, &Diagnostics { header: header(at, ""), status })
     }
 
-    /// The number of moments that are in the output, also if this program is killed now.
+    /// The number of moments that are in the output, even if this program is killed now.
     #[must_use]
     pub const fn written(&self) -> u64 {
         self.written
@@ -148,7 +149,7 @@ impl<W: Write> McapWriter<W> {
         Ok(())
     }
 
-    /// What does not change: the model, and the links that are fixed.
+    /// Writes what does not change: the model, and the links that are fixed.
     fn describe(&mut self, at: Duration) -> io::Result<()> {
         self.publish(topics::DESCRIPTION, at, &Text { data: arm_model::urdf()? })?;
         let straight = [FineAngle::from(sevenbot::Angle::from_register(0)); 7];
@@ -192,7 +193,7 @@ impl<W: Write> McapWriter<W> {
     }
 }
 
-/// The options of every file: uncompressed, and without an index.
+/// The options of every file: uncompressed, and written without seeking.
 pub(crate) fn options() -> WriteOptions {
     let library = concat!("sevenbot ", env!("CARGO_PKG_VERSION"));
     WriteOptions::new().compression(None).profile("ros2").library(library).disable_seeking(true)

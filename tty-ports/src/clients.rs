@@ -1,4 +1,4 @@
-//! Counts the clients of ports: who has a terminal open, by inotify.
+//! Counts the clients of ports, which are the programs that have a terminal open, by inotify.
 //!
 //! The program itself keeps its ports open, so the kernel does not report that the last client has closed a port.
 //! inotify reports each open and each close. But it merges equal reports that follow each other unread: two opens in a
@@ -51,7 +51,7 @@ struct WatchedPort {
     news: PortNews,
 }
 
-/// What happened at a port since the last call of [`Clients::take_news`].
+/// The events at a port since the last call of [`Clients::take_news`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PortNews {
     /// A client opened it.
@@ -64,16 +64,16 @@ impl Clients {
     /// Creates an inotify instance, without ports.
     ///
     /// # Errors
-    /// The system refuses one, for example because this user's limit is reached.
+    /// The system refuses to create one, for example because this user's limit is reached.
     pub fn new() -> io::Result<Self> {
         let inotify = inotify::init(CreateFlags::NONBLOCK | CreateFlags::CLOEXEC)?;
         Ok(Self { inotify, ports: HashMap::new(), has_changed: false })
     }
 
-    /// Counts the clients of a terminal from now on. Only this program may have it open before.
+    /// Counts the clients of a terminal from now on. At this time, only this program may have it open.
     ///
     /// # Errors
-    /// inotify refuses.
+    /// inotify refuses to watch the terminal or its directory.
     pub fn watch(&mut self, terminal: &Path) -> io::Result<ClientWatch> {
         let events = WatchFlags::OPEN | WatchFlags::CLOSE_WRITE | WatchFlags::CLOSE_NOWRITE;
         if let Some(directory) = terminal.parent() {
@@ -98,7 +98,7 @@ impl Clients {
         self.ports.get(&port.0).map_or(0, |port| port.count)
     }
 
-    /// What happened at a port since the last call, as of the last [`Clients::update`].
+    /// The events at a port since the last call of this function, up to the last [`Clients::update`].
     pub fn take_news(&mut self, port: ClientWatch) -> PortNews {
         self.ports.get_mut(&port.0).map(|port| take(&mut port.news)).unwrap_or_default()
     }
@@ -109,7 +109,7 @@ impl Clients {
         self.ports.get(&port.0).is_some_and(|port| port.news != PortNews::default())
     }
 
-    /// Did clients open or close any port since the last call, as of the last [`Clients::update`]?
+    /// Did clients open or close any port since the last call of this function, up to the last [`Clients::update`]?
     pub fn take_has_changed(&mut self) -> bool {
         take(&mut self.has_changed)
     }

@@ -142,7 +142,7 @@ impl Pty {
     }
 
     /// Drops unread answers and the exclusive lock of the last client; its unread *requests* stay. The terminal mode is
-    /// reset only without a client that may have set it.
+    /// reset only if no new client is there, which may have set it.
     fn reset(&self, is_unused: bool) -> io::Result<()> {
         tcflush(&self.terminal, QueueSelector::IFlush)?;
         // Output that a client has suspended (XOFF) stays so for the next one.

@@ -71,9 +71,9 @@ pub struct Serial {
 /// The latency timer of the adapter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LatencyTimer {
-    /// Before the port was opened, in milliseconds.
+    /// The setting before the port was opened, in milliseconds.
     pub found: u32,
-    /// Now, in milliseconds.
+    /// The setting now, in milliseconds.
     pub now: u32,
 }
 

@@ -1,8 +1,9 @@
 //! A stable name for the port: a symbolic link that exists while the program runs.
 //!
-//! A program that was killed leaves its link. The next program may replace that, but never the link of a program that runs, nor
-//! one that the user made. The number of a pseudo-terminal is used again, so its existence alone does not tell. Two things do: a
-//! lock that the kernel frees with its process, and whether the pseudo-terminal is younger than the link.
+//! A program that was killed leaves its link. The next program may replace this link, but never the link of a running program,
+//! nor a link that the user made. The kernel reuses the numbers of pseudo-terminals, so the existence of one does not show that
+//! the program of the link still runs. Two things do: a lock that the kernel frees when the process ends, and whether the
+//! pseudo-terminal is older than the link.
 
 use std::fs::{self, Metadata};
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -33,7 +34,8 @@ pub enum SymlinkError {
         /// Where the link leads.
         target: PathBuf,
     },
-    /// The path is a symbolic link that leads nowhere, but not to a pseudo-terminal: no program of this kind made it.
+    /// The path is a symbolic link to something that does not exist and is not a pseudo-terminal. No program of this kind made
+    /// it.
     #[error(
         "{}: that link to {} is not one to a port of a simulator, so it is not replaced: remove it, or choose another path",
         path.display(), target.display()
@@ -91,7 +93,7 @@ fn lock_address(path: &Path) -> io::Result<SocketAddr> {
 
 impl Symlink {
     /// Creates a link at `path` to `port`, which this program has open. Replaces only a link that a killed program has
-    /// left: one to a pseudo-terminal that is gone, whose number another one has got since, or that has become `port` itself.
+    /// left: a link to a pseudo-terminal that is gone, whose number was reused since, or whose number `port` now has.
     ///
     /// # Errors
     /// See [`SymlinkError`].
@@ -120,7 +122,7 @@ fn take_away(path: &Path, port: &Path, link: &Metadata, lock: &LinkLock) -> Resu
     if target != port {
         check_left_behind(path, &target, link)?;
     }
-    // Another program that starts now may replace the link at the same time: look again at what was moved away.
+    // Another program that starts now may replace the link at the same time, so check the link that was moved away.
     let mut aside = path.as_os_str().to_owned();
     aside.push(format!(".{}.old", std::process::id()));
     let aside = PathBuf::from(aside);
@@ -145,7 +147,7 @@ fn check_left_behind(path: &Path, target: &Path, link: &Metadata) -> Result<(), 
     }
 }
 
-/// When a file was created or got its mode.
+/// The time at which a file was created or last got its mode.
 fn changed(metadata: &Metadata) -> (i64, i64) {
     (metadata.ctime(), metadata.ctime_nsec())
 }

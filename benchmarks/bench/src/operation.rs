@@ -33,7 +33,7 @@ impl RegisterOperation {
         }
     }
 
-    /// The current values of the bytes that it names, and of the bytes after them up to `count`.
+    /// The current values of `count` bytes, from the first byte of this operation on.
     pub(crate) fn values(&self, registers: &[u8], count: u8) -> Vec<u8> {
         registers.iter().skip(usize::from(self.first)).take(usize::from(count)).copied().collect()
     }

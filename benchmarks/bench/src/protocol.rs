@@ -14,7 +14,7 @@ const MAVLINK_CRC: Crc<u16> = Crc::<u16>::new(&CRC_16_MCRF4XX);
 
 /// Message id of MAVLink's TUNNEL, low byte first.
 const TUNNEL: [u8; 3] = [0x81, 0x01, 0];
-/// CRC_EXTRA of TUNNEL: the checksum of a message ends with this byte.
+/// CRC_EXTRA of TUNNEL: the checksum of a message covers this byte at the end, but the message does not contain it.
 const TUNNEL_CRC_EXTRA: u8 = 147;
 /// MAVLink system and component of the host.
 const HOST: [u8; 2] = [255, 190];
@@ -35,7 +35,7 @@ pub(crate) enum Protocol {
 }
 
 impl Protocol {
-    /// The request for an operation. `registers` holds the values before it.
+    /// The request for an operation. `registers` holds the values before the operation.
     pub(crate) fn request(self, operation: &RegisterOperation, registers: &[u8]) -> Vec<u8> {
         let &RegisterOperation { first, count, .. } = operation;
         let written = operation.written.as_slice();
@@ -50,7 +50,7 @@ impl Protocol {
         }
     }
 
-    /// The reply to an operation; empty if there is none. `registers` holds the values after it.
+    /// The reply to an operation; empty if the operation has no reply. `registers` holds the values after the operation.
     pub(crate) fn reply(self, operation: &RegisterOperation, registers: &[u8]) -> Vec<u8> {
         let &RegisterOperation { first, count, .. } = operation;
         let read = operation.values(registers, count);

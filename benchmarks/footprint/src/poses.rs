@@ -5,9 +5,9 @@
 use kinematics::limits::check_arm;
 use kinematics::{Vector, forward, ik7};
 
-/// How many random poses there are.
+/// The number of random poses.
 const RANDOM: usize = 255;
-/// The wrist is behind the base axis at y = 0. Only the second heading that is tried lets the hand point down.
+/// A pose with the wrist behind the base axis, at y = 0. Only the second heading that is tried lets the hand point down.
 const AWAY: [f32; 6] = [0.0, 140.0, 0.0, 90.0, 180.0, 0.0];
 /// [`mix`] of all poses, in order, beginning with 0.
 pub const BITS: u32 = 2_661_855_130;
@@ -25,7 +25,7 @@ pub fn poses() -> impl Iterator<Item = [f32; 6]> {
     all.filter(|&pose| check_arm(pose).is_ok()).take(RANDOM).chain([AWAY])
 }
 
-/// Mixes bits of what was before with those of a pose: where it puts the tip, and the angles that lead there.
+/// Mixes `bits` with the bits of a pose: the position of its tip, and the angles that inverse kinematics give for it.
 #[must_use]
 pub fn mix(bits: u32, pose: [f32; 6]) -> u32 {
     let hand = forward(pose).hand;

@@ -94,7 +94,7 @@ impl Server for ModbusCoreServer {
 }
 
 impl ModbusRegisters {
-    /// Executes a request and returns the reply. Returns `true` if it was executed.
+    /// Executes a request, and passes the reply to `reply`. Returns `true` if the request was executed.
     fn answer(&mut self, request: Request<'_>, reply: &mut impl FnMut(&[u8])) -> bool {
         let result = execute(&mut self.words, request, &mut self.data);
         let executed = result.is_ok();

@@ -69,7 +69,7 @@ impl Server for OurServer {
 
     fn end(&mut self, reply: &mut impl FnMut(&[u8])) {
         self.now = self.now + ABANDON_AFTER;
-        // Twice: a timeout during a search is recorded only after that search.
+        // Push twice: a timeout during a search is recorded only after that search.
         for _ in 0..2 {
             self.deframer.push(self.now, &[]);
             self.answer(reply);

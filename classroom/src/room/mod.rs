@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!   connections, time ──▶ mod.rs ──▶ orders.rs: what pupils and the teacher want
-//!                            └─────▶ outgoing.rs: what each has to be told next
+//!                            └─────▶ outgoing.rs: the next message for each connection
 //! ```
 
 mod orders;
@@ -20,40 +20,40 @@ use crate::pupil::Pupil;
 use crate::real_arm::{ArmNews, RealArm};
 use crate::stop_all::StopAll;
 
-/// Pupils in a class, with those whose connection was lost.
+/// The largest number of pupils in a class, including those whose connection was lost.
 pub const MOST_PUPILS: usize = 64;
-/// Teacher's screens: the one on the desk, and that of the beamer.
+/// The largest number of teacher's screens, such as one on the desk and one on the projector.
 const MOST_TEACHERS: usize = 4;
-/// A tab says who it is within this time, or its connection ends.
+/// A tab has to join within this time, or its connection ends.
 const JOIN_TIME: Duration = Duration::from_millis(10_000);
-/// A pupil whose connection was lost is shown for this long, and has its name for this long.
+/// A pupil whose connection was lost is shown, and keeps the name, for this long.
 const LOST_KEPT: Duration = Duration::from_millis(120_000);
 
-/// What a class is told at its start.
+/// The properties of a class that do not change.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ClassInfo {
     /// The addresses that pupils open, for the teacher's screen.
     pub addresses: Vec<String>,
-    /// What they have to type, for the teacher's screen. The server checks it.
+    /// The code that pupils have to type, for the teacher's screen. The server checks it. `None` if there is none.
     pub code: Option<String>,
     /// The class has a real arm.
     pub has_arm: bool,
 }
 
-/// The right of a pupil to the real arm. A later lease is another one.
+/// Identifies a lease: the right of a pupil to the real arm. A later lease has another id.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LeaseId(u32);
 
 #[derive(Debug)]
 enum Connection {
-    /// It has not said who it is since it was opened. If it becomes a pupil, this is its key.
+    /// A tab that has not joined yet, the key that it gets if it becomes a new pupil, and when it connected.
     Stranger {
         key: String,
         since: Instant,
     },
     Pupil(u32),
     Teacher(Desk),
-    /// It is told why, and then closed.
+    /// The reason for the refusal; `None` once it was sent. Then the connection is closed.
     Refused(Option<Refused>),
 }
 
@@ -73,9 +73,9 @@ pub struct Classroom {
     next_connection: u64,
     arm: Option<RealArm>,
     stop: Option<StopAll>,
-    /// The teacher's message, and how many there were.
+    /// The number of teacher's messages so far, and the last one.
     message: (u32, String),
-    /// Changes so far, which teacher's screens have to show.
+    /// The number of changes so far that teacher's screens have to show.
     change: u64,
 }
 
@@ -96,7 +96,7 @@ impl Classroom {
         }
     }
 
-    /// A tab of a pupil connects. `key` is a new secret: who knows it is this pupil.
+    /// A tab of a pupil connects. `key` is a new secret: a tab that knows it belongs to this pupil.
     pub fn open_pupil(&mut self, now: Instant, key: String) -> ConnectionId {
         let pupils = |connection: &&Connection| {
             matches!(connection, Connection::Stranger { .. } | Connection::Pupil(_))
@@ -131,7 +131,7 @@ impl Classroom {
         self.change += 1;
     }
 
-    /// A message came. One that is none ends the connection.
+    /// Takes a message of a connection. An invalid message ends the connection.
     pub fn receive(&mut self, now: Instant, id: ConnectionId, text: &str) {
         let Some(connection) = self.connections.get(&id) else { return };
         let is_taken = match connection {
@@ -187,7 +187,8 @@ impl Classroom {
         self.end_lease_of(now, number, LeaseEnd::Lost);
     }
 
-    /// A number for a new pupil. Who is gone for the longest time makes room.
+    /// A number for a new pupil. In a full class, removes the pupil whose connection has been lost for the longest time; `None`
+    /// if all are connected.
     fn free_number(&mut self, now: Instant) -> Option<u32> {
         if self.pupils.len() >= MOST_PUPILS {
             let lost = self.pupils.iter().filter_map(|(&number, pupil)| Some((pupil.lost_for(now)?, number)));
@@ -199,7 +200,7 @@ impl Classroom {
         Some(number)
     }
 
-    /// Time passes. Call it each 50 ms or so.
+    /// Advances the class to `now`. Call it about every 50 ms.
     pub fn poll(&mut self, now: Instant) {
         self.pupils.values_mut().for_each(|pupil| pupil.poll(now));
         for connection in self.connections.values_mut() {
@@ -222,7 +223,7 @@ impl Classroom {
         self.pupils.retain(is_kept);
     }
 
-    /// The real arm has news.
+    /// Takes news of the real arm.
     pub fn arm_news(&mut self, now: Instant, news: ArmNews) {
         let Some(arm) = &mut self.arm else { return };
         let (is_new, confirms_stop) = arm.take_news(news);
@@ -232,7 +233,7 @@ impl Classroom {
         self.change += u64::from(is_new);
     }
 
-    /// Has the real arm to be held now? The caller then starts to hold it, before it passes [`ArmNews`] again.
+    /// True if the real arm has to be held now. The caller then starts a hold, before it passes [`ArmNews`] again.
     pub fn take_hold(&mut self, now: Instant) -> bool {
         self.arm.as_mut().is_some_and(|arm| arm.take_hold(now))
     }

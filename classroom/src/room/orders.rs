@@ -10,7 +10,7 @@ use crate::pupil::Pupil;
 use crate::stop_all::{PendingStop, StopAll};
 
 impl Classroom {
-    /// Returns whether a pupil may say this.
+    /// Carries out a message of a pupil. Returns false if a pupil must not send it.
     pub(super) fn hear_pupil(&mut self, now: Instant, number: u32, message: FromPupil) -> bool {
         let Some(pupil) = self.pupils.get_mut(&number) else { return false };
         match message {
@@ -74,7 +74,7 @@ impl Classroom {
         }
     }
 
-    /// The arm is held, and belongs to nobody.
+    /// Ends the lease, if there is one: requests a hold, and tells all pupils.
     pub(super) fn end_lease(&mut self, now: Instant, why: LeaseEnd) {
         let Some(number) = self.arm.as_mut().and_then(|arm| arm.take_back(now)) else { return };
         self.pupils.get_mut(&number).into_iter().for_each(|pupil| pupil.end_lease(why));
@@ -82,7 +82,7 @@ impl Classroom {
         self.change += 1;
     }
 
-    /// Everybody hears at once who has the arm.
+    /// Makes a question to every pupil due at once, which tells who has the arm.
     fn ask_all(&mut self) {
         self.pupils.values_mut().for_each(Pupil::ask);
     }

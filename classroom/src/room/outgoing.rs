@@ -1,4 +1,4 @@
-//! What each connection has to be told next.
+//! The next message for each connection.
 
 use protocol_core::time::Instant;
 use serde::Serialize;
@@ -21,7 +21,7 @@ impl Classroom {
         self.connections.iter().filter(move |(_, connection)| has_message(connection)).map(|(&id, _)| id)
     }
 
-    /// The next message for a connection, in JSON: what is most urgent now.
+    /// The next message for a connection, in JSON: the most urgent one; `None` if none is due.
     pub fn next_message(&mut self, now: Instant, id: ConnectionId) -> Option<String> {
         let mut connection = self.connections.remove(&id)?;
         let message = match &mut connection {
@@ -40,7 +40,7 @@ impl Classroom {
         message
     }
 
-    /// Has it been told all, and is it to be closed?
+    /// True if the connection has got its last message, and has to be closed.
     #[must_use]
     pub fn is_over(&self, id: ConnectionId) -> bool {
         matches!(self.connections.get(&id), None | Some(Connection::Refused(None)))

@@ -5,7 +5,7 @@ use sevenbot::recording::{Moment, Recording};
 
 use crate::{mcap_bytes, recording};
 
-/// What can be read, and whether the reader says that this is not all.
+/// The moments that can be read, and whether the reader says that these are not all.
 fn readable(bytes: &[u8]) -> (Vec<Moment>, bool) {
     match read(bytes) {
         Ok(recording) => (recording.moments().collect(), false),

@@ -28,7 +28,7 @@ fn recording(count: u32) -> Recording {
     Recording::of_moments(moments).expect("a recording")
 }
 
-/// As an MCAP file. Without an end it is what a killed program leaves.
+/// The recording as an MCAP file. If its end is cut off, it is what a killed program leaves.
 fn mcap_bytes(recording: &Recording, layout: McapLayout) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut writer = McapWriter::new(&mut bytes, layout).expect("a file");

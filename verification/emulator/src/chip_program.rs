@@ -1,4 +1,4 @@
-//! Where the linked programs for the chip are.
+//! The paths of the linked programs for the chip.
 
 use std::path::{Path, PathBuf};
 use std::{env, fs};
@@ -39,7 +39,7 @@ impl ChipProgram {
     /// Reads the file.
     ///
     /// # Errors
-    /// It is not built.
+    /// The file cannot be read, for example because the program is not built.
     pub fn read(&self) -> TaskResult<Vec<u8>> {
         let path = self.path();
         fs::read(&path).map_err(|why| format!("cannot read {}: {why}", path.display()).into())

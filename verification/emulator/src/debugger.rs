@@ -10,7 +10,7 @@ use std::path::Path;
 
 use crate::process::{TIMEOUT, TaskResult, wait_for};
 
-/// A connection to an emulator. It is stopped as long as it lasts.
+/// A connection to an emulator. The chip is stopped between the commands of the debugger.
 pub struct Debugger {
     stream: UnixStream,
     received: Vec<u8>,
@@ -53,10 +53,10 @@ impl Debugger {
         Ok(word.swap_bytes())
     }
 
-    /// Makes the chip go on at another instruction, without the debugger.
+    /// Detaches the debugger, and lets the chip continue at another instruction.
     ///
     /// # Errors
-    /// The emulator refuses it.
+    /// The emulator refuses to set the program counter, or has ended.
     pub fn continue_at(mut self, address: u32) -> TaskResult {
         self.answer("qSupported")?;
         // The emulator allows writes of registers only to a debugger that has read its description of the chip.
@@ -102,7 +102,7 @@ impl Debugger {
         let start = self.received.iter().position(|&byte| byte == b'$')?;
         let length = self.received.get(start..)?.iter().position(|&byte| byte == b'#')?;
         let end = start + length;
-        // Two digits of the checksum. A local socket damages nothing.
+        // Two digits of the checksum follow. They are not checked, because a local socket does not corrupt bytes.
         if self.received.len() < end + 3 {
             return None;
         }

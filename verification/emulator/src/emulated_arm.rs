@@ -15,11 +15,11 @@ use crate::frame;
 use crate::machine::Machine;
 use crate::process::TaskResult;
 
-/// The period of the servo bus and of the samples.
+/// The pause between two exchanges with the servo bus, and between two samples.
 const SAMPLE_PERIOD: RealTime = RealTime::from_micros(200);
 /// The longest wait for a reply, on a busy machine.
 const REPLY_TIMEOUT: Duration = Duration::from_millis(5_000);
-/// The wait between two looks for a reply.
+/// The time between two checks for a reply.
 const REPLY_PERIOD: Duration = Duration::from_millis(1);
 
 /// The image and its servos.
@@ -45,7 +45,7 @@ impl EmulatedArm {
         Ok(Self { plant, machine, bus, clock, now })
     }
 
-    /// The time of the servos.
+    /// The current time of the servos.
     #[must_use]
     pub const fn now(&self) -> Instant {
         self.now
@@ -80,7 +80,7 @@ impl EmulatedArm {
         Err(format!("no reply to a read of register {address}"))?
     }
 
-    /// Runs the servos for this time, and shows them to `sample` again and again.
+    /// Runs the servos for this time, and calls `sample` after each exchange with the servo bus.
     pub fn run(&mut self, time: Duration, mut sample: impl FnMut(&Plant)) -> TaskResult {
         let until = self.clock.now() + time;
         loop {
@@ -109,7 +109,7 @@ impl EmulatedArm {
         self.machine.monitor.execute("cont", "")
     }
 
-    /// Lets the chip go on at another instruction.
+    /// Lets the chip continue at another instruction.
     pub fn jump_to(&mut self, address: u32) -> TaskResult {
         self.machine.debugger()?.continue_at(address)
     }

@@ -22,7 +22,7 @@ impl InstructionLog {
         Self { path: folder.path().join("log"), begin: 0 }
     }
 
-    /// The options of the emulator, after those of its clock.
+    /// The options of the emulator for the log. `clock` is the value of `-icount`.
     pub(crate) fn options(&self, clock: &str) -> [String; 5] {
         ["-icount", clock, "-singlestep", "-D", &self.path.display().to_string()].map(str::to_owned)
     }
@@ -33,14 +33,14 @@ impl InstructionLog {
         monitor.human("log exec,nochain")
     }
 
-    /// Ends, and returns what was logged since the begin.
+    /// Stops the log, and returns the events since `begin`.
     pub(crate) fn end(&self, monitor: &mut Monitor) -> TaskResult<Vec<TraceEvent>> {
         monitor.human("log none")?;
         let mut file = File::options().read(true).write(true).open(&self.path)?;
         file.seek(SeekFrom::Start(self.begin))?;
         let mut text = String::new();
         file.read_to_string(&mut text)?;
-        // If the emulator writes on at its own position, the file stays large but takes no space.
+        // If the emulator continues to write at its old position, the file becomes sparse: large, but without blocks on the disk.
         file.set_len(0)?;
         Ok(trace::parse(&text))
     }

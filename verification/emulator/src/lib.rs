@@ -1,5 +1,5 @@
 //! The unmodified image for the arm in an emulator, with simulated servos, and a port for any serial
-//! client. `cargo xtask emulate` builds it and runs it here.
+//! client. `cargo xtask emulate` builds the image and runs it here.
 //!
 //! ```text
 //!   client ══ port ══ Relay ── socket ── USART1 ┌──────────┐ USART2 ── socket ── host-sim --servo-socket
@@ -117,7 +117,7 @@ fn has_qemu() -> bool {
 /// Fails with instructions if the emulator is not installed.
 ///
 /// # Errors
-/// What installs it.
+/// The emulator is not installed. The error tells how to install it.
 pub fn need_qemu() -> TaskResult {
     if has_qemu() {
         return Ok(());

@@ -30,7 +30,7 @@ const CLOCK: u32 = 0x4000_0024;
 /// The status registers of the USARTs of host link and servo bus (RM0090, section 30.6.1).
 const HOST_STATUS: u32 = 0x4001_1000;
 const SERVO_STATUS: u32 = 0x4000_4400;
-/// A received byte waits in the USART.
+/// Bit RXNE of a status register: a received byte waits in the USART.
 const RXNE: u32 = 1 << 5;
 
 /// The image, its lines and its servos.
@@ -75,7 +75,7 @@ impl<B: ServoBus> Lockstep<B> {
         let file = IMAGE.read()?;
         let program = Program::read(&file)?;
         for sleep in program.addresses_of(Effect::WaitForInterrupt) {
-            // The debugger cannot step over a sleep, only over what precedes it.
+            // Break one instruction earlier, because the debugger cannot step over a sleep.
             let before = program.instruction_before(sleep).ok_or("nothing precedes a sleep")?;
             debugger.break_at(before)?;
         }
@@ -84,7 +84,7 @@ impl<B: ServoBus> Lockstep<B> {
         Ok(Self { bus, debugger, machine, log, host, servos, sent_to_servos: 0, now })
     }
 
-    /// Sends bytes to the host link of the image, from its next stop on.
+    /// Queues bytes for the host link of the image. Each stop delivers one of them.
     pub fn host_send(&mut self, bytes: &[u8]) {
         self.host.to_image.extend(bytes);
     }

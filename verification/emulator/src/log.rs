@@ -24,7 +24,7 @@ const CONTROL_BLOCK: u32 = 48;
 pub(crate) struct Log {
     control_block: u32,
     printed_to: usize,
-    /// In this order: the printer ends when its input is closed.
+    /// Declared before `_printer`, so dropped before it: the printer ends when its input is closed.
     input: ChildStdin,
     _printer: ChildProcess,
 }

@@ -18,7 +18,7 @@ use crate::{frame, start_servos};
 
 /// The time after which the arm has processed a request and sleeps.
 const IDLE_TIME: Duration = Duration::from_millis(20);
-/// The time after which the arm has processed a byte and sleeps, as a rule. What is logged costs time.
+/// The time after which the arm has usually processed a byte and sleeps. It is short, because logging takes time.
 const BYTE_TIME: Duration = Duration::from_millis(5);
 
 /// The image, with an optional log.
@@ -35,7 +35,7 @@ impl LoggedImage {
         let servos = start_servos(&folder, &[], None)?;
         let bus = servo_socket(&folder);
         let mut image = Self::start(folder, Some(servos), &bus, "shift=0,sleep=on")?;
-        // Twice: before their first read, no servos are reported as missing.
+        // Check twice: before their first read, no servos are reported as missing.
         for _ in 0..2 {
             sleep(Duration::from_secs(1));
             while image.read(MISSING_SERVOS.address, 1)? != [0] {
@@ -67,7 +67,7 @@ impl LoggedImage {
         Ok(())
     }
 
-    /// Sends a byte to the arm, and logs what it does then. On a busy machine the log may end before the arm sleeps.
+    /// Sends a byte to the arm, and logs how the arm processes it. On a busy machine the log may end before the arm sleeps.
     pub fn watch_byte(&mut self, byte: u8) -> TaskResult<Vec<TraceEvent>> {
         self.watch(|image| {
             image.machine.host.write_all(&[byte])?;
@@ -117,7 +117,7 @@ impl LoggedImage {
         acted.and(events)
     }
 
-    /// Accesses are logged while they are switched on, with or without the instructions.
+    /// Switches the log of register accesses on or off. It does not depend on the log of instructions.
     fn log_accesses(&mut self, state: &str) -> TaskResult {
         ["read", "write"].iter().try_for_each(|event| {
             self.machine.monitor.human(&format!("trace-event memory_region_ops_{event} {state}"))

@@ -17,7 +17,7 @@ use crate::debugger::Debugger;
 use crate::monitor::{self, Monitor};
 use crate::process::{ChildProcess, TaskResult};
 
-/// The emulator, and its package.
+/// The name of the emulator's program, and of its package on Debian and Ubuntu.
 pub const QEMU: &str = "qemu-system-arm";
 /// USART1's first control register (RM0090, section 30.6). Bytes before its setup are lost.
 const HOST_LINK_CONTROL: u32 = 0x4001_100C;
@@ -28,7 +28,7 @@ const RECEIVER_ON: u32 = 1 << 13 | 1 << 2;
 pub(crate) struct Machine {
     pub(crate) monitor: Monitor,
     pub(crate) host: UnixStream,
-    // In this order: the emulator ends before the sockets.
+    // Declared before `folder`, so dropped before it: the emulator ends before its sockets are removed.
     _child: ChildProcess,
     folder: TempDir,
 }
@@ -86,7 +86,7 @@ impl Machine {
     }
 }
 
-/// The emulator with an image and no lines.
+/// The command that starts the emulator with an image, without serial lines.
 #[must_use]
 pub fn qemu(image: &ChipProgram) -> Command {
     let mut command = Command::new(QEMU);

@@ -32,7 +32,7 @@ pub struct ChildProcess(pub Child);
 
 impl Drop for ChildProcess {
     fn drop(&mut self) {
-        // An error means that it has ended.
+        // An error means that the process has ended.
         let _ = self.0.kill();
         let _ = self.0.wait();
     }

@@ -13,9 +13,9 @@ use tty_ports::pty::Pty;
 
 use crate::process::TaskResult;
 
-/// The most bytes that wait for the emulator. With this many, the port is not read.
+/// The largest number of bytes in one read. The port is not read while bytes wait for the emulator.
 const CAPACITY: usize = 4_096;
-/// The period of other tasks.
+/// The poll period of other tasks, such as the firmware's log.
 const POLL_PERIOD: Timespec = Timespec { tv_sec: 0, tv_nsec: 50_000_000 };
 
 /// A port and the socket behind it.
@@ -48,7 +48,7 @@ impl Relay {
             let count = self.port.read(&mut bytes)?;
             self.to_arm.extend(bytes.iter().take(count));
         }
-        // After the read, so that the sender of these bytes is known before the reply arrives.
+        // Update the clients after the read, so that the sender of these bytes is known before the reply arrives.
         if let Some(clients) = &mut self.clients {
             clients.update()?;
             if self.port.update_clients(clients)? {
@@ -69,7 +69,7 @@ impl Relay {
         Ok(())
     }
 
-    /// Sleeps until there are bytes, a client or a signal, or for the poll period if `polls`.
+    /// Sleeps until there are bytes, a client or a signal; at most for the poll period if `polls`.
     pub(crate) fn sleep(&self, signals: &Signals, polls: bool) -> io::Result<()> {
         let if_empty = |bytes: &[u8], flags| if bytes.is_empty() { flags } else { PollFlags::empty() };
         let if_waiting = |bytes: &[u8], flags| if bytes.is_empty() { PollFlags::empty() } else { flags };

@@ -96,7 +96,7 @@ pub fn between(events: &[TraceEvent], is_mark: impl Fn(&TraceEvent) -> bool) -> 
     marks.iter().zip(marks.iter().skip(1)).map(|(&from, &to)| from..to).collect()
 }
 
-/// The calls of the handler at `entry`, from its first instruction to its return, without those that another of `entries`
+/// The calls of the handler at `entry`, from its first instruction to its return. Leaves out calls that a handler of `entries`
 /// interrupts.
 pub fn handler_calls<'a>(
     events: &'a [TraceEvent],
@@ -110,7 +110,8 @@ pub fn handler_calls<'a>(
     calls.filter(|call| !call.iter().skip(1).any(is_entry)).collect()
 }
 
-/// The instructions of the function that `events` begin with, and of those that it calls.
+/// The events from the first instruction of a function to its return, with the functions that it calls; `None` if it does
+/// not return.
 fn call<'a>(events: &'a [TraceEvent], effects: &HashMap<u64, Effect>) -> Option<&'a [TraceEvent]> {
     let mut depth = 0_u32;
     let end = events.iter().position(|event| {

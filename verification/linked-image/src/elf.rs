@@ -44,7 +44,7 @@ pub struct Symbol {
 
 /// A section in the chip's memory.
 pub struct Section {
-    /// Its name: `.text`.
+    /// Its name, such as `.text`.
     pub name: String,
     /// Its address.
     pub address: u64,
@@ -91,7 +91,7 @@ impl<'data> Program<'data> {
         calls.map(|(&at, _)| at).collect()
     }
 
-    /// The functions, each once, even with several names.
+    /// The functions. Symbols without a size, such as aliases in a linker script, are left out.
     pub fn functions(&self) -> impl Iterator<Item = &Symbol> {
         self.symbols.iter().filter(|symbol| symbol.is_function && symbol.size > 0)
     }
@@ -153,7 +153,7 @@ impl<'data> Program<'data> {
         Ok(places)
     }
 
-    /// Ranges of code from one line of source: address and length in bytes.
+    /// The ranges of code that each come from one line of source: address and length in bytes.
     pub fn line_ranges(&self) -> ReadResult<Vec<(u64, u64)>> {
         let mut line_ranges = Vec::new();
         for code in &self.code {
@@ -167,7 +167,7 @@ impl<'data> Program<'data> {
 
 impl SourceLine {
     fn new(path: &str, line: u32) -> Self {
-        // The workspace of this crate is that of the program.
+        // This crate and the program are in the same workspace.
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).unwrap_or(Path::new("/"));
         let ours = Path::new(path).strip_prefix(root).ok().and_then(Path::to_str);
         let theirs = path.split_once("/library/").or_else(|| path.split_once("/registry/src/index."));
@@ -264,7 +264,7 @@ fn marks(elf: &ElfFile32<'_>) -> Vec<(u64, bool)> {
     marks
 }
 
-/// The vector table without the stack pointer and unused entries.
+/// The handlers in the vector table, each once, without the initial stack pointer and unused entries.
 fn handlers(elf: &ElfFile32<'_>) -> ReadResult<Vec<u64>> {
     let table = elf.section_by_name(".vector_table").ok_or("no vector table")?.data()?;
     let mut handlers = Vec::new();

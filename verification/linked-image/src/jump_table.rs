@@ -24,7 +24,7 @@ pub(crate) struct FunctionCode<'a> {
 }
 
 const PC: u8 = 15;
-/// How far before a jump the instructions are searched that calculate its target.
+/// The number of instructions before a jump that are searched for the computation of its target.
 const MOST_BETWEEN: usize = 8;
 
 impl FunctionCode<'_> {
@@ -74,7 +74,7 @@ impl FunctionCode<'_> {
         Some(entries.take_while(|&entry| self.is_long_branch(entry)).collect())
     }
 
-    /// The last instruction before `at` that writes `register`: its first operand. Others may stand between.
+    /// The last instruction before `at` that writes `register`, its first operand. Other instructions may stand between.
     fn last_write(&self, register: u8, at: u64) -> Option<u64> {
         let end = self.instructions.binary_search(&at).ok()?;
         let near = self.instructions.get(end.saturating_sub(MOST_BETWEEN)..end)?;

@@ -1,4 +1,4 @@
-//! What of a linked program is written to the flash.
+//! The parts of a linked program that are written to the flash.
 
 use object::Endianness;
 use object::elf::{FileHeader32, PT_LOAD};
@@ -15,11 +15,11 @@ pub struct LoadedRange {
     pub bytes: Vec<u8>,
 }
 
-/// The ranges that the ELF file of a program writes to the flash, by address. Initial values of static data lie where the
-/// flash has them.
+/// The ranges that the ELF file of a program writes to the flash, by address. Initial values of static data have their
+/// addresses in the flash, not in RAM.
 ///
 /// # Errors
-/// The file is no ELF file of 32 bits.
+/// The file is not a 32-bit ELF file, or a segment lies outside it.
 pub fn loaded_ranges(file: &[u8]) -> ReadResult<Vec<LoadedRange>> {
     let header = FileHeader32::<Endianness>::parse(file)?;
     let endian = header.endian()?;
@@ -34,7 +34,7 @@ pub fn loaded_ranges(file: &[u8]) -> ReadResult<Vec<LoadedRange>> {
     Ok(joined(ranges))
 }
 
-/// Ranges that touch become one.
+/// Joins adjacent ranges.
 fn joined(ranges: Vec<LoadedRange>) -> Vec<LoadedRange> {
     let mut joined: Vec<LoadedRange> = Vec::new();
     for range in ranges {

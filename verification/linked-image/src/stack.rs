@@ -97,8 +97,8 @@ impl<'a> CallGraph<'a> {
         Ok(deepest)
     }
 
-    /// The stack of the whole program: from reset, with every other exception once, at the worst moment of the one before.
-    /// Priorities allow less than that. A hard fault starts a new stack.
+    /// The largest stack of the whole program: the program after reset, interrupted by every other exception once, each at the
+    /// worst moment of the exception before. Priorities allow less nesting than that. A hard fault starts a new stack.
     pub fn worst(&self, program: &Program<'_>) -> ReadResult<Depth> {
         let [reset, handlers @ ..] = program.handlers() else { Err("no vector table")? };
         let mut whole = self.depth(*reset)?;

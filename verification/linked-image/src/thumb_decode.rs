@@ -61,7 +61,7 @@ pub(crate) fn effect(at: u64, bytes: &[u8]) -> Effect {
     }
 }
 
-/// The halfword at this index of bytes.
+/// The halfword at the byte index `at`.
 pub(crate) fn halfword(bytes: &[u8], at: usize) -> Option<u16> {
     bytes.get(at..)?.first_chunk().copied().map(u16::from_le_bytes)
 }
@@ -103,7 +103,7 @@ fn effect_of(at: u64, length: u64, instruction: &Instruction) -> Effect {
             Effect::None
         }
         (SUB, Operand::Reg(to), Operand::Reg(from)) if is_stack(to) && is_stack(from) => lowered(third),
-        // The first operand of these is read, not written.
+        // These instructions read their first operand and do not write it.
         (STR | STRB | STRH | STRD | CMP | CMN | TEQ | TST, ..) => {
             moved_stack(instruction).unwrap_or(Effect::None)
         }

@@ -1,4 +1,4 @@
-//! A host and a person that do everything that can be done to an arm, drawn from a seed.
+//! Random actions of a host and of a person on an arm, drawn from a seed.
 
 use std::fmt::Write;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -9,9 +9,9 @@ use arm_sim::{Action, Duration, Joint, Simulation};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
-/// Times that something is done.
+/// The number of actions in a session.
 const ACTS: u32 = 40;
-/// The longest time between two of them, in microseconds.
+/// The longest time between two actions, in microseconds.
 const LONGEST_PAUSE: u64 = 100_000;
 /// Actions without a random part.
 const ACTIONS: [&str; 13] = [
@@ -30,14 +30,14 @@ const ACTIONS: [&str; 13] = [
     "scene table 190; cube red 40 100 40 260; cylinder can 40 60 200 -40 250",
     "scene off",
 ];
-/// Faults of a servo and what a joint meets, for a time.
+/// Faults of a servo, and walls and pushes that a joint meets. Each lasts for a time in [`SHORTLY`].
 const JOINT_FAULTS: [&str; 8] =
     ["late=20", "garbled=3", "stuck", "missing", "wall=80", "wall=100/500", "push=700", "push=-700"];
-/// Other faults, for a time.
+/// Other faults that last for a time in [`SHORTLY`].
 const SHORT_FAULTS: [&str; 3] = ["7=thing=30", "7=thing=60/100", "supply=off"];
-/// How long they last: an emergency stop of a second switches the motors off (D29).
+/// How long such faults last, in microseconds. The longer one makes an emergency stop end in state 0 (D29).
 const SHORTLY: [u64; 2] = [300_000, 1_200_000];
-/// Faults until they are taken back.
+/// Faults that stay until they are cleared.
 const ARM_FAULTS: [&str; 5] =
     ["line=loss=5", "line=corruption=5", "line=delay=3", "bus=echo", "supply=dips=100"];
 
@@ -48,7 +48,7 @@ struct SessionLines(Arc<Mutex<String>>);
 impl SessionLines {
     fn add(&self, line: &dyn std::fmt::Display) {
         let mut text = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        // A string takes everything.
+        // Writing to a string does not fail.
         let _ = writeln!(text, "{line}");
     }
 }
@@ -78,7 +78,7 @@ pub fn random_session(seed: u64) -> String {
 struct Random(Xoshiro256PlusPlus);
 
 impl Random {
-    /// A number from 0 on, below `below`.
+    /// A random number from 0 to `below` - 1.
     fn byte(&mut self, below: u8) -> u8 {
         u8::try_from(self.0.next_u64() % u64::from(below)).unwrap_or(0)
     }

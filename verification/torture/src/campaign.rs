@@ -15,9 +15,9 @@ use crate::scenario::{Scenario, of_seed};
 use crate::world::{FailedWorld, TortureWorld};
 use crate::world_counts::WorldCounts;
 
-/// The virtual time of a world.
+/// The virtual time of a world: an hour. The last world of a virtual budget may be shorter.
 const WORLD_TIME: Duration = Duration::from_millis(3_600_000);
-/// The period of progress reports.
+/// Progress is reported whenever no world has ended for this long.
 const PROGRESS_PERIOD: RealTime = RealTime::from_millis(500);
 
 /// The time of a campaign.
@@ -38,9 +38,9 @@ pub struct CampaignPlan {
     pub budget: TimeBudget,
     /// The scenario of all worlds; `None` if each seed selects its own.
     pub scenario: Option<&'static Scenario>,
-    /// Good frames for each kind of disturbance in the trials of the parser.
+    /// The number of good frames for each kind of disturbance in the trials of the parser; 0 skips these trials.
     pub frames: usize,
-    /// Free motions to compare with those without protection.
+    /// The number of free motions, each carried out with and without protection (D27).
     pub motions: u64,
 }
 
@@ -53,14 +53,14 @@ pub struct CampaignResult {
     pub failure: Option<Box<FailedWorld>>,
     /// The trials of the parser.
     pub parser_trials: Vec<ParserTrial>,
-    /// The trial of free motion.
+    /// The sum of all trials of free motion.
     pub free_motion: FreeMotionTrial,
     /// The real time of the worlds.
     pub elapsed: RealTime,
 }
 
 impl CampaignResult {
-    /// The number of worlds and their counts.
+    /// The number of worlds and their counts, summed over all scenarios.
     #[must_use]
     pub fn total(&self) -> (u64, WorldCounts) {
         self.worlds.values().fold((0, WorldCounts::default()), |(worlds, mut sum), (more, counts)| {
@@ -91,7 +91,7 @@ struct RemainingWork {
     is_stopped: bool,
 }
 
-/// Runs the plan. Calls `progress` with the result so far, periodically.
+/// Runs the plan. Calls `progress` from time to time with the result so far and the elapsed real time.
 pub fn run(plan: &CampaignPlan, mut progress: impl FnMut(&CampaignResult, RealTime)) -> CampaignResult {
     let mut result = CampaignResult::default();
     let start = RealInstant::now();

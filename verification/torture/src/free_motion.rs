@@ -1,6 +1,6 @@
 //! Trials of free motion: without an obstacle the protection changes no byte for the servos (D27).
 //!
-//! The motions are those of motion-core's tests, with any seed. Two whole arms carry them out, one without protection.
+//! The motions come from motion-core's tests, with any seed. Two whole arms carry them out, one without protection.
 
 use arm_sim::flash::Flash;
 use arm_sim::plant::Plant;
@@ -14,17 +14,17 @@ use protocol_core::wire::FrameBuffer;
 
 use crate::shared::free_moves::{FreeMoves, Step};
 
-/// From power-up to the first move.
+/// The time from power-up to the first move.
 const START: Duration = Duration::from_millis(1_000);
 
 /// The result of some motions.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct FreeMotionTrial {
-    /// The motions.
+    /// The number of motions.
     pub motions: usize,
-    /// The bytes for the servos that were compared.
+    /// The number of bytes to the servos that were compared.
     pub bytes: usize,
-    /// The seeds of motions in which the bytes differ, or a joint counts as blocked.
+    /// The seeds of motions in which the bytes differ, or in which a joint was blocked or let go.
     pub different: Vec<u64>,
 }
 
@@ -110,7 +110,7 @@ impl MovedArm {
         let mut frame = FrameBuffer::new();
         Request::Write { address: step.address, values: &step.values }.encode(&mut frame);
         self.arm.host_send(self.now, &frame);
-        // The time of the frame on the line, too, before the next one.
+        // Wait at least 2 ms, so that the frame has left the line before the next one is sent.
         self.pass(Duration::from_millis(step.wait_ms.max(2)));
         let registers = self.arm.registers();
         self.was_blocked |= [BLOCKED_JOINTS, LET_GO_JOINTS].iter().any(|row| registers.get(row.address) != 0);
@@ -132,7 +132,7 @@ mod tests {
     #[test]
     fn d27_free_motion_of_a_whole_arm_is_byte_for_byte_that_without_protection() {
         let mut all = FreeMotionTrial::default();
-        // In the last four a joint turns back at full speed, so that its push lasts longest.
+        // With the last four seeds a joint reverses at full speed, which makes its push last longest.
         [0, 1, 2, 3, 78, 1111, 3009, 3707].into_iter().map(run).for_each(|trial| all.add(trial));
         assert_eq!((all.motions, all.different), (8, vec![]));
         assert!(all.bytes > 100_000, "{} bytes", all.bytes);

@@ -6,6 +6,7 @@
 //!                                 └──▶ parser_trial: good frames on a disturbed line ─▶ ParserTrial ─────────────────┤
 //!   cli ─▶ load: a client that saturates a port                                               result_table ◀─────────┘
 //!   cli ─▶ sag: how far the arm sags during a failure
+//!   cli ─▶ obstacles: what becomes of the arm at walls, after alarms and after emergency stops
 //!   fuzz: the targets of `verification/fuzz/`, and of the test of its corpora
 //! ```
 //!
@@ -15,8 +16,8 @@
 pub mod campaign;
 pub mod cli;
 pub mod seeded_rng;
-// Fuzz targets report a violated rule by a panic. Only the fuzzer and tests call them.
 pub mod free_motion;
+// Fuzz targets report a violated rule by a panic. Only the fuzzer and tests call them.
 #[allow(clippy::expect_used, clippy::indexing_slicing, clippy::panic, clippy::unwrap_used)]
 pub mod fuzz;
 mod linkage_goals;
@@ -28,7 +29,7 @@ pub mod per_joint;
 pub mod result_table;
 pub mod sag;
 pub mod scenario;
-// Test code, which reports a failure by a panic. The parts that a campaign uses report none.
+// Test code, which reports a failure by a panic. The parts that a campaign uses do not panic.
 #[allow(clippy::indexing_slicing, clippy::panic, clippy::unwrap_used)]
 mod shared;
 pub mod text_table;

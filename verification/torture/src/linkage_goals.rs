@@ -5,12 +5,12 @@ use protocol_core::registers::Joint;
 
 use crate::violation::{Check, ensure};
 
-/// The smallest and the largest sum of the angles of joints 2 and 3: 19 to 161 degrees, plus 65.
+/// The smallest and the largest sum of the angles of joints 2 and 3, in microdegrees: 19 to 161 degrees, plus 65.
 pub(crate) const LINKAGE: (i32, i32) = (84_000_000, 226_000_000);
 /// Goals are rounded to counts of up to 0.212 degrees. This allows two counts of each of the two joints, in microdegrees.
 const ROUNDING: i32 = 2 * 2 * 212_000;
 
-/// The smallest distance of the goals from the inside of the linkage, in microdegrees, since both joints are driven.
+/// The smallest excess of the goals over the linkage since both joints are driven, in microdegrees; `None` before the first.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct LinkageGoals(Option<i32>);
 

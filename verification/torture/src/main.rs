@@ -1,4 +1,4 @@
-//! Simulates the arm with injected faults, saturates a port, or measures the sag.
+//! Simulates the arm with injected faults, saturates a port, or measures the sag or the effect of obstacles.
 
 use std::io::{self, IsTerminal, Write};
 use std::process::ExitCode;

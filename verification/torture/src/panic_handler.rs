@@ -1,11 +1,11 @@
-//! What the panic handler of the firmware sends to the servos.
+//! The frames that the panic handler of the firmware sends to the servos.
 
 use motion_core::TorqueCodes;
 use motion_core::servo_bus::Torque;
 use motion_core::servo_bus::frame::{ServoFrameBuffer, register, sync_write};
 use protocol_core::registers::Joint;
 
-/// How often it sends the frame, with a pause before each.
+/// The number of times that it sends the frame, with a pause before each.
 pub(crate) const FRAMES: usize = 4;
 
 /// The frame: all servos in state 0, damping.

@@ -1,4 +1,4 @@
-//! Trials of the parser on a disturbed line: those of protocol-core's tests, with any seed.
+//! Trials of the parser on a disturbed line: the trials of protocol-core's tests, with any seed.
 
 use crate::shared::disturbed_line::{self, Disturbance};
 use crate::shared::stream;

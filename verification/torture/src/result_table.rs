@@ -10,7 +10,7 @@ use crate::text_table::Column::{Left, Right};
 use crate::text_table::TextTable;
 use crate::world_counts::WorldCounts;
 
-/// A row: the trial, its number, its failures.
+/// A row: the trial, the amount of work, and the failures.
 pub type ResultRow = [String; 3];
 
 /// The results of a plan as a table.

@@ -83,7 +83,7 @@ impl Sag {
         arm.sag
     }
 
-    /// Adds a sample of the joint angles. Their values before the failure are `rest`.
+    /// Adds a sample of the joint angles. `rest` holds the angles before the failure.
     pub fn sample(&mut self, rest: &[i32; JOINTS], angles: [i32; JOINTS]) {
         for ((largest, rest), angle) in self.0.iter_mut().zip(rest).zip(angles) {
             *largest = (*largest).max(angle.abs_diff(*rest));
@@ -249,7 +249,7 @@ mod tests {
 
     #[test]
     fn a_restart_of_the_controller_costs_at_most_a_droop() {
-        // The measured position is the new goal (D12), so each joint droops once more. It was rounded to a count.
+        // The measured position, rounded to a count, is the new goal (D12), so each joint droops once more.
         for cause in [SagCause::WarmRestart, SagCause::Watchdog] {
             let sag = Sag::over(cause);
             for (joint, droop) in Joint::ALL.into_iter().zip(droops()) {

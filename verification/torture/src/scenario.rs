@@ -45,7 +45,7 @@ pub enum InjectedFault {
     Push,
     /// A thing is put between the claws.
     Thing,
-    /// The weight in the gripper becomes one up to 500 g.
+    /// The payload changes to a weight of up to 500 g.
     Payload,
     /// Overload or heat is forced on a servo.
     ServoTrip,
@@ -64,9 +64,9 @@ pub struct Scenario {
     pub mean_interval: Duration,
     /// The faults, each with the same probability. A fault may be listed twice.
     pub faults: &'static [InjectedFault],
-    /// Writes of settings in a thousand writes.
+    /// The number of writes of settings in a thousand writes.
     pub settings_per_mille: u64,
-    /// Power cuts in a hundred starts.
+    /// The number of power cuts in a hundred starts.
     pub cut_starts_percent: u64,
 }
 

@@ -21,7 +21,7 @@ const TIME: Duration = Duration::from_secs(2);
 /// Bytes of the reply to a read of seven registers.
 const REPLY_LENGTH: usize = 14;
 
-/// What the arms do.
+/// What the arms do during a measurement; see the start of this file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Load {
     Idle,
@@ -49,7 +49,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Arm-seconds a second of all threads together.
+/// The simulated arm-seconds in a real second, of all threads together.
 fn arm_seconds(count: usize, threads: usize, load: Load) -> f64 {
     thread::scope(|scope| {
         let one = || scope.spawn(move || rate(&mut arms(count / threads), load));
@@ -90,7 +90,7 @@ fn step(arm: &mut Simulation, number: u64, load: Load) {
     arm.advance(end - arm.now());
 }
 
-/// The growth of the process by this many arms, in KiB for each.
+/// How much this process grows for each of `count` arms, in KiB.
 fn memory_of(count: usize) -> Result<f64, Box<dyn Error>> {
     let before = anonymous_memory()?;
     let arms = arms(count);

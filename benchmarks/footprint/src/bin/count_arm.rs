@@ -39,7 +39,7 @@ struct CountedController {
     servos: ScriptedServos,
     /// A reply that the controller has not received yet.
     reply: frame::ServoFrameBuffer,
-    /// Most instructions of a single call of `poll`.
+    /// The largest number of instructions in a single call of `poll`.
     longest_call: u32,
 }
 

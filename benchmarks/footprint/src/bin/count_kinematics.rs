@@ -1,4 +1,4 @@
-//! Counts the instructions of kinematics: the most for any of many poses.
+//! Counts the instructions of kinematics: the largest count over many poses.
 
 #![no_std]
 #![no_main]

@@ -32,7 +32,7 @@ enum SaveResult {
 
 #[derive(Arbitrary, Debug)]
 enum ControllerStep<'a> {
-    /// The shell's loop runs this often, without delay.
+    /// The shell's loop runs this many times, each time at the deadline of the controller.
     Run(u8),
     /// The shell is late by this time.
     LateMicros(u32),
@@ -46,7 +46,7 @@ enum ControllerStep<'a> {
         address: u8,
         values: &'a [u8],
     },
-    // Writes that are in range.
+    // Four writes whose values are in range.
     State(u8),
     Pose {
         speed: u8,

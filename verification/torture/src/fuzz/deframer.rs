@@ -2,8 +2,8 @@
 //!
 //! - If frames are pulled after every piece, the deframer returns the results of the model in the same order.
 //! - If frames are pulled late, while bytes wait for room, the deframer returns at least the results of the model for the
-//!   stream without its short silences, and no result that the stream does not contain. Then it depends on the time of a
-//!   pull which frames inside a frame are returned (D4).
+//!   stream without its short silences, and no result that the stream does not contain. Frames inside another frame may or
+//!   may not be returned, depending on the time of a pull (D4).
 
 use std::iter;
 
@@ -39,7 +39,7 @@ enum StreamStep<'a> {
         damage: Option<(u8, u8)>,
     },
     SilenceHalfMillis(u8),
-    /// In late mode only: frames are pulled this often.
+    /// Pull up to this many frames. Without effect unless the run is late.
     Pull(u8),
 }
 
@@ -106,7 +106,7 @@ struct LateReader {
     now_us: u64,
     last_byte_us: u64,
     returned: Vec<Received>,
-    /// The model receives the long silences only.
+    /// Receives the same bytes, and the long silences, but not the short ones.
     model: Model,
     expected: Vec<Received>,
 }

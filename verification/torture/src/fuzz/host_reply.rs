@@ -69,7 +69,7 @@ fn snapshots(bytes: &[u8], piece: usize) -> Vec<Snapshot> {
             pull(&mut deframer, &mut snapshots);
         }
     }
-    // The gap, then the timeout of a frame.
+    // Pass the gap, then the timeout of a frame (D4), so that the deframer returns the rest.
     for millis in [2, 100] {
         deframer.push(Instant::ZERO + Duration::from_millis(millis), &[]);
         pull(&mut deframer, &mut snapshots);
@@ -96,7 +96,8 @@ fn check(snapshot: &Snapshot) {
     check_names(snapshot);
 }
 
-/// Every register of the snapshot has an entry, alone or for its whole row. The library parses the entry's name.
+/// Checks that every register of the snapshot has its own entry or one for its whole row, and that the library parses the
+/// name of each entry.
 fn check_names(snapshot: &Snapshot) {
     let mut entries = register_text::entries(snapshot).into_iter().peekable();
     let mut row = None;

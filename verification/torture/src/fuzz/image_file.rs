@@ -1,5 +1,5 @@
-//! The simulator's settings image with any content. It is refused and not changed, or its settings are in range (D19), the
-//! same after every start, and can be replaced.
+//! The simulator's settings image with any content. Either the file is refused and not changed, or its settings are in range
+//! (D19), stay the same after every start, and can be replaced.
 
 use std::fs;
 use std::path::Path;
@@ -21,7 +21,7 @@ const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 pub struct Input<'a> {
     filled_with: u8,
     patches: Vec<ImagePatch<'a>>,
-    /// The number of missing bytes.
+    /// If 7 modulo 8, the last byte of the file is missing.
     missing: u8,
     next: [u8; Image::LENGTH],
 }
@@ -69,7 +69,7 @@ fn start(path: &Path) -> Result<FileSettings, ImageError> {
 
 fn check_store(mut settings: FileSettings, next: [u8; Image::LENGTH]) {
     check_settings(settings.found());
-    // The first save goes into blank sectors. Otherwise the start has made room.
+    // There is room for a save: either the sectors are blank, or the start has made room.
     assert_eq!(settings.storage(), Storage::Ready);
     let found = settings.found().copied();
     settings = restart(settings, found);
@@ -79,7 +79,7 @@ fn check_store(mut settings: FileSettings, next: [u8; Image::LENGTH]) {
 }
 
 fn restart(settings: FileSettings, expected: Option<Image>) -> FileSettings {
-    // An open image is locked.
+    // An open image is locked, so close it before it is opened again.
     drop(settings);
     match start(FILE.path()) {
         Ok(settings) => {

@@ -1,4 +1,4 @@
-//! The journal of the settings with any power cuts (D19), on the strict flash model. The invariants are those of the
+//! The journal of the settings with any power cuts (D19), on the strict flash model. It has to keep the invariants of the
 //! journal's own tests.
 
 use crate::shared::journal_world::World;

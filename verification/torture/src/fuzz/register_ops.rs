@@ -1,4 +1,4 @@
-//! The register file against a model with its own tables, written from `docs/protocol.md`, sections 3, 8, 9 and 10, alone.
+//! The register file against a model with its own tables, written only from sections 3, 8, 9 and 10 of `docs/protocol.md`.
 
 use arbitrary::Arbitrary;
 use protocol_core::registers::map::{FRAMES_ACCEPTED, FRAMES_CORRUPTED};
@@ -135,9 +135,9 @@ impl FileAndModel {
 /// The values of all 256 registers.
 #[derive(Clone)]
 struct TableModel {
-    /// Offsets are in sign and magnitude.
+    /// Offsets are in sign and magnitude, whatever `offsets_in` says.
     values: [u8; 256],
-    /// The map of the last write, or of register 20 before it (M5).
+    /// The encoding in which a read shows the offsets: the map of the last write, or before it the map of register 20 (M5).
     offsets_in: Map,
 }
 
@@ -193,7 +193,7 @@ impl TableModel {
                 Some((low, None, _) | (low, _, None)) => return Err((4, low)),
                 _ => {}
             }
-            // The present positions are there.
+            // A write to 54..60 in map 2.1 does not change them: they hold the present positions.
             if !(54..=60).contains(&at) {
                 after.values[usize::from(at)] = stored(map, at, value);
             }
@@ -201,7 +201,7 @@ impl TableModel {
         Ok(after)
     }
 
-    /// What a read gives.
+    /// The values that a read returns.
     fn shown(&self) -> [u8; 256] {
         let mut shown = self.values;
         if self.offsets_in == Map::V21 {
@@ -227,7 +227,7 @@ fn stored(map: Map, address: u8, value: u8) -> u8 {
     }
 }
 
-/// The low byte of the two-byte register that a byte belongs to.
+/// The address of the low byte of the two-byte register that holds `address`; `None` for a one-byte register.
 fn word_at(address: u8) -> Option<u8> {
     matches!(address, 128..=141 | 184..=185).then_some(address & !1)
 }

@@ -34,7 +34,7 @@ pub enum LoadError {
     /// The port cannot be opened.
     #[error("cannot open {port}: {cause}: is the simulator running?")]
     Port {
-        /// Its name.
+        /// The name of the port.
         port: String,
         /// The cause.
         cause: serialport::Error,

@@ -19,7 +19,7 @@ use super::result::LoadResult;
 const REPLY_TIMEOUT: Duration = Duration::from_secs(60);
 /// The timeout of one read of the port.
 const READ_TIMEOUT: Duration = Duration::from_millis(1);
-/// The memory is measured from this time on, when every buffer has been used once.
+/// The memory is measured only after this time, when every buffer has been used once.
 const WARM_UP: Duration = Duration::from_secs(10);
 /// One request in this many is a write.
 const WRITE_PERIOD: u64 = 8;
@@ -41,7 +41,7 @@ pub(super) struct LoadClient {
     window: usize,
     pending: VecDeque<PendingRead>,
     requests: u64,
-    /// Bytes sent, and the bytes among them up to the last read with a reply.
+    /// The number of bytes sent, and how many of these were sent up to the last read that has a reply.
     sent: u64,
     acknowledged: u64,
     result: LoadResult,
@@ -76,7 +76,7 @@ impl LoadClient {
         Ok(())
     }
 
-    /// Sends a read of any length, but not one whose reply looks like a report.
+    /// Sends a read of varying address and length. No read has the range of a report, so a reply never looks like one.
     fn send_read(&mut self) -> Result<(), LoadError> {
         let [a, b, ..] = self.requests.wrapping_mul(0x9E37_79B9_7F4A_7C15).to_be_bytes();
         let (address, count) = match a % 4 {

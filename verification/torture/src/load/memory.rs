@@ -12,7 +12,7 @@ pub(super) struct Memory {
 }
 
 impl Memory {
-    /// Adds a measurement. A process that has ended changes nothing.
+    /// Adds a measurement. Does nothing if the process has ended.
     pub(super) fn measure(&mut self, pid: u32) {
         let status = fs::read_to_string(format!("/proc/{pid}/status")).unwrap_or_default();
         let Some(resident) = resident_kib(&status) else { return };

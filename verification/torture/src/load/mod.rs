@@ -19,7 +19,7 @@ pub use args::{LoadArgs, LoadError};
 use client::LoadClient;
 pub use result::LoadResult;
 
-/// The period of the progress line and of the look at the memory.
+/// The period of the progress line and of the memory measurement.
 const PROGRESS_PERIOD: Duration = Duration::from_secs(1);
 
 /// Loads the port.

@@ -18,7 +18,7 @@ pub struct LoadResult {
     pub(super) unexpected: u64,
     pub(super) corrupted: u64,
     pub(super) bytes: u64,
-    /// The most bytes of requests without a reply yet, and the most bytes of their replies.
+    /// The largest number of request bytes without a reply yet, and of bytes in the replies that are still expected.
     pub(super) max_pending: (u64, u64),
     pub(super) round_trips: RoundTrips,
     pub(super) memory: Memory,

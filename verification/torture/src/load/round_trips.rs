@@ -28,7 +28,7 @@ impl RoundTrips {
         self.worst = self.worst.max(took);
     }
 
-    /// The time in milliseconds that this many thousandths of the round trips do not exceed.
+    /// A quantile in milliseconds: this many thousandths of the round trips do not take longer.
     fn quantile_ms(&self, thousandths: u64) -> f64 {
         let rank = self.counts.iter().sum::<u64>() * thousandths / 1_000;
         let mut seen = 0;

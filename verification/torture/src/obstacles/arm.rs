@@ -4,26 +4,26 @@ use arm_sim::plant::Plant;
 use protocol_core::registers::map::PROTECTION;
 use protocol_core::time::{Duration, Instant};
 
-/// The time for the start, and for a pose.
+/// The time to wait after the start, and after a pose was written.
 pub(super) const SETTLE_TIME: Duration = Duration::from_millis(3_000);
 /// The time between two points of a stream, in milliseconds.
 pub(super) const PERIOD_MS: u8 = 20;
 
 /// An arm in front of an obstacle: a controller with simulated servos.
 pub trait ObstacleArm: Sized {
-    /// Why an experiment cannot go on.
+    /// The reason why an experiment cannot continue.
     type Error;
 
     /// Switches a new arm on.
     ///
     /// # Errors
-    /// It does not start.
+    /// The arm does not start.
     fn start() -> Result<Self, Self::Error>;
 
-    /// The time of the servos.
+    /// The current time of the simulated servos.
     fn now(&self) -> Instant;
 
-    /// The servos and what is around them.
+    /// The simulated servos, with their load and the obstacles around them.
     fn plant(&mut self) -> &mut Plant;
 
     /// Writes registers.
@@ -57,7 +57,7 @@ pub trait ObstacleArm: Sized {
     }
 }
 
-/// A new arm with or without protection.
+/// Starts an arm, waits until it holds still, and switches its protection on or off.
 pub(super) fn start<A: ObstacleArm>(is_protected: bool) -> Result<A, A::Error> {
     let mut arm = A::start()?;
     arm.run(SETTLE_TIME)?;
@@ -65,12 +65,12 @@ pub(super) fn start<A: ObstacleArm>(is_protected: bool) -> Result<A, A::Error> {
     Ok(arm)
 }
 
-/// Percent with one decimal.
+/// Formats permille as percent with one decimal.
 pub(super) fn percent(permille: u16) -> String {
     format!("{}.{} %", permille / 10, permille % 10)
 }
 
-/// Degrees with one decimal, rounded up.
+/// Formats thousandths of a degree as degrees with one decimal, rounded up.
 pub(super) fn degrees(millidegrees: u32) -> String {
     let tenths = millidegrees.div_ceil(100);
     format!("{}.{}°", tenths / 10, tenths % 10)

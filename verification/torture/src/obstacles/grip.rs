@@ -10,9 +10,9 @@ use protocol_core::time::Duration;
 use super::arm::{ObstacleArm, percent, start};
 
 const CLAW: Joint = Joint::ALL[6];
-/// The time in which the peak is searched for, in seconds.
+/// The peak push is measured for this time, in seconds.
 const SETTLED_S: u64 = 30;
-/// Where the thing is, and where the claw is sent, in degrees.
+/// The angle at which the claw touches the thing, and the target of the claw, in degrees.
 const THING_AT: i32 = 60;
 const TARGET: u8 = 20;
 

@@ -1,4 +1,4 @@
-//! Alarms that are forced on a servo, and emergency stops, while the arm streams.
+//! Alarms that are forced on a servo, and emergency stops, while the arm follows a stream of points.
 
 use arm_sim::plant::SupplyFault;
 use arm_sim::servo::Trip;
@@ -9,12 +9,12 @@ use protocol_core::time::Duration;
 use super::arm::{ObstacleArm, PERIOD_MS, SETTLE_TIME, degrees, start};
 
 const PAYLOAD_G: u16 = 100;
-/// The point that is streamed, in hundredths of a degree: 40 degrees from where joint 1 stands.
+/// The point that is streamed, in hundredths of a degree: 40 degrees from the position of joint 1.
 const POINT: u16 = 13_000;
 /// The time after an alarm, or after the supply came back.
 const AFTER_TIME: Duration = Duration::from_millis(4_000);
 
-/// What happens to an arm that streams.
+/// What happens to an arm while it follows a stream.
 #[derive(Clone, Copy, Debug)]
 pub enum Mishap {
     /// An alarm of joint 3.
@@ -24,7 +24,7 @@ pub enum Mishap {
 }
 
 impl Mishap {
-    /// All of them.
+    /// All mishaps, in the order of the table.
     pub(super) const ALL: [Self; 5] = [
         Self::Trip(Trip::Overload),
         Self::Trip(Trip::Heat),
@@ -32,7 +32,7 @@ impl Mishap {
         Self::EmergencyStop(3_000),
         Self::EmergencyStop(30_000),
     ];
-    /// Short emergency stops.
+    /// The emergency stops that are short enough for real time.
     pub(super) const SHORT_STOPS: [Self; 2] = [Self::EmergencyStop(300), Self::EmergencyStop(3_000)];
 
     fn name(self) -> String {
@@ -49,7 +49,7 @@ pub(super) fn seconds(millis: u64) -> String {
     format!("{}.{} s", millis / 1_000, millis / 100 % 10)
 }
 
-/// Joint 3 is let go, or all joints are, with a payload, while joint 1 streams.
+/// The table of mishaps: joint 3 or all joints lose their torque, with a payload, while joint 1 follows a stream.
 pub(super) fn table<A: ObstacleArm>(mishaps: &[Mishap]) -> Result<String, A::Error> {
     let mut table = String::from(
         "| what happens | protection | joint 3 sinks by | joint 1 goes to its stream at | state after it |\n\

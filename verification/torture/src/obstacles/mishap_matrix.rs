@@ -10,16 +10,16 @@ use super::arm::{ObstacleArm, degrees};
 use super::mishap::{Mishap, seconds};
 use super::wall::WallCase;
 
-/// The joint is driven for this time. The program sends nothing after that, so what moves then was wound up.
+/// The joint is driven for this time. Nothing is sent after it, so a later motion is the effect of windup.
 const DRIVEN_TIME: Duration = Duration::from_millis(400);
 /// The time after an alarm, or after the supply came back.
 const AFTER_TIME: Duration = Duration::from_millis(6_000);
 
-/// What became of a joint. Angles in thousandths of a degree.
+/// How far a joint fell and swung. Angles are in thousandths of a degree.
 #[derive(Clone, Copy, Debug)]
 struct Fate {
     begun: i32,
-    /// Where it was when it got torque again.
+    /// The angle at which the joint got torque again.
     engaged: Option<i32>,
     was_lost: bool,
     fall: u32,
@@ -42,7 +42,7 @@ impl Fate {
     }
 }
 
-/// The worst of some joints.
+/// The largest fall and swing of any joint in some cases. `hold` counts the cases after which all joints have torque.
 #[derive(Clone, Copy, Debug, Default)]
 struct Worst {
     cases: u32,
@@ -65,7 +65,7 @@ impl Worst {
     }
 }
 
-/// Alarms by joint, and emergency stops by payload.
+/// The tables of the worst results: alarms by joint, and emergency stops by payload.
 pub(super) fn tables<A: ObstacleArm>(cases: &[WallCase]) -> Result<String, A::Error> {
     let head = "cases | a joint falls by | then its motor turns it by | all hold after it |\n\
                 | --- | --- | --- | --: | --: | --: | --: |\n";
@@ -109,7 +109,7 @@ fn worst<'a, A: ObstacleArm>(
     Ok(worst)
 }
 
-/// The joint of an alarm, or all joints after an emergency stop.
+/// Runs a case with a mishap. Returns the fate of the joint with the alarm, or of all joints after an emergency stop.
 fn fates<A: ObstacleArm>(case: &WallCase, mishap: Mishap, is_protected: bool) -> Result<Vec<Fate>, A::Error> {
     let mut arm: A = case.start(is_protected)?;
     case.drive_for(&mut arm, DRIVEN_TIME)?;

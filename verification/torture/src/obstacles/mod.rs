@@ -1,10 +1,10 @@
 //! Measures what becomes of the arm at obstacles, with and without its protection (`torture obstacles`; on the emulated image
 //! `cargo xtask obstacles`).
 //!
-//! A joint is driven against a wall, in a matrix of poses, payloads and speeds, by a target or by a stream of points. A
-//! second table has alarms that are forced on a servo, and emergency stops under a stream. A third one has things between
-//! the claws. All values are true values of the plant, sampled once per millisecond. Push is the load of a joint that stands
-//! still, in 0.1 % of its stall torque.
+//! The first tables have a joint that is driven against a wall, in a matrix of poses, payloads and speeds, by a target or by
+//! a stream of points. The next ones have forced alarms and emergency stops, first under a stream, then in that matrix. The
+//! last one has things between the claws. All values are true values of the plant, sampled once per millisecond. Push is the
+//! load of a joint that stands still, in 0.1 % of its stall torque.
 
 mod arm;
 mod grip;
@@ -30,7 +30,7 @@ pub struct Experiments {
 }
 
 impl Experiments {
-    /// All experiments: for virtual time.
+    /// All experiments. They take hours of virtual time.
     #[must_use]
     pub fn all() -> Self {
         let grip_time = Duration::from_millis(3_600_000);
@@ -38,7 +38,7 @@ impl Experiments {
         Self { walls: WallCase::all(), mishaps: &Mishap::ALL, matrix, grip_time }
     }
 
-    /// A few of them, which take some minutes in real time.
+    /// A few experiments, which take some minutes in real time.
     #[must_use]
     pub fn few() -> Self {
         let grip_time = Duration::from_millis(60_000);

@@ -1,4 +1,4 @@
-//! A joint that is driven against a wall, and what becomes of it when the wall goes.
+//! A joint that is driven against a wall: its push at the wall, and its sag when the wall is removed.
 
 use std::collections::VecDeque;
 
@@ -24,16 +24,17 @@ const POSES: [[u8; 6]; 8] = [
 const FEW_POSE: [u8; 6] = POSES[0];
 
 const SPEEDS: [u8; 3] = [10, 60, 0];
-/// The wall is this far from the joint, and the target this far, in degrees.
+/// The distances of the wall and of the target from the start of the joint, in degrees.
 const WALL_DISTANCE: i16 = 8;
 const TARGET_DISTANCE: i16 = 30;
 /// The time at the wall, and the time after the wall has gone.
 const PUSH_TIME: Duration = Duration::from_millis(5_000);
 const AFTER_TIME: Duration = Duration::from_millis(2_000);
-/// A stream goes to its target in this time. It ends before the wall goes, so that what moves then is what was wound up.
+/// The time in which a stream reaches its target, and the time of its last point. That is before the wall is removed, so a
+/// motion after the removal is the effect of windup.
 const STREAM_TIME: Duration = Duration::from_millis(1_000);
 const STREAM_END: Duration = Duration::from_millis(3_500);
-/// The push is averaged over this time, and from this time on it is lasting.
+/// The push is averaged over the first time. It counts as lasting after the second time, from the contact on.
 const AVERAGED_TIME: Duration = Duration::from_millis(100);
 const LASTING_AFTER: Duration = Duration::from_millis(400);
 /// A joint that was away from the wall for this long has bounced off.
@@ -55,8 +56,8 @@ impl WallCase {
     /// The payloads, in grams.
     pub(super) const PAYLOADS_G: [u16; 3] = [0, 100, 300];
 
-    /// Each joint but the claw in each pose, with each payload, at each speed, by a target and by a stream. From pose to pose
-    /// and from speed to speed the wall changes its side.
+    /// Each joint but the claw in each pose, with each payload, at each speed, by a target and by a stream. The side of the
+    /// wall alternates from pose to pose and from speed to speed.
     pub(super) fn all() -> Vec<Self> {
         let mut cases = Vec::new();
         for joint in Joint::ALL.into_iter().take(6) {
@@ -90,7 +91,7 @@ impl WallCase {
         Self::all().into_iter().filter(is_among).collect()
     }
 
-    /// Those at the usual speed, for what needs no wall.
+    /// The cases at speed 60, for experiments without a wall.
     pub(super) fn at_usual_speed() -> Vec<Self> {
         Self::all().into_iter().filter(|case| case.speed == 60).collect()
     }
@@ -103,13 +104,13 @@ impl WallCase {
         self.payload_g
     }
 
-    /// True for one joint of each pose.
+    /// True for one joint of each pose. Experiments that concern all joints at once need no more.
     pub(super) fn is_of_its_pose(&self) -> bool {
         let number = POSES.iter().position(|pose| *pose == self.pose);
         number.is_some_and(|number| number % 6 == usize::from(self.joint.index()))
     }
 
-    /// A new arm in the pose, whose joint can be driven.
+    /// Starts an arm, moves it to the pose, and sets the speed of the joint and the period of the stream.
     pub(super) fn start<A: ObstacleArm>(&self, is_protected: bool) -> Result<A, A::Error> {
         let mut arm: A = start(is_protected)?;
         arm.plant().set_load(self.payload_g);
@@ -135,7 +136,7 @@ impl WallCase {
         Ok(())
     }
 
-    /// This far from where the joint stands, in degrees, towards the wall.
+    /// The angle at this distance from the start of the joint towards the wall, in degrees.
     fn towards_wall(&self, distance: i16) -> u8 {
         let from = self.pose.get(usize::from(self.joint.index())).copied().unwrap_or(90);
         let distance = if self.is_behind { -distance } else { distance };
@@ -146,7 +147,7 @@ impl WallCase {
         i32::from(self.towards_wall(WALL_DISTANCE)) * 1_000
     }
 
-    /// Sends the target at the start, or the point of a stream at this time.
+    /// Sends the target, or the point of the stream at this time since its start.
     fn drive<A: ObstacleArm>(&self, arm: &mut A, since: Duration) -> Result<(), A::Error> {
         if !self.is_streamed {
             return arm.write(TARGET_POSITION.of(self.joint), &[self.towards_wall(TARGET_DISTANCE)]);
@@ -212,7 +213,7 @@ fn lasting_of_contact(pushes: &[(Instant, u16)]) -> u16 {
     u16::try_from(greatest).unwrap_or(u16::MAX)
 }
 
-/// What became of a joint at a wall.
+/// The push, the trip and the sag of a joint at a wall.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct WallResult {
     /// The greatest push, in 0.1 %.
@@ -221,7 +222,7 @@ pub struct WallResult {
     pub lasting: u16,
     /// The servo has switched itself off.
     pub has_tripped: bool,
-    /// How far from the wall the joint was after the wall was taken away, in thousandths of a degree.
+    /// The largest distance of the joint from the wall's place after the wall was removed, in thousandths of a degree.
     pub sag: u32,
 }
 
@@ -241,16 +242,16 @@ pub fn push_against_wall<A: ObstacleArm>(
     let gone = arm.now();
     while arm.now() - gone < AFTER_TIME {
         arm.step()?;
-        // From the wall: a joint whose servo switched itself off may have fallen before the wall goes.
+        // Measure from the wall: a joint whose servo switched itself off may have fallen before the wall was removed.
         result.sag = result.sag.max(arm.plant().angle(case.joint).abs_diff(wall));
     }
     Ok(result)
 }
 
-/// A case, whether the arm was protected, and what became of the joint.
+/// A case, whether the arm was protected, and the result.
 type Outcome = (WallCase, bool, WallResult);
 
-/// The worst results by joint, and by what distinguishes the cases.
+/// The tables of the worst results: by joint, payload, speed, kind of target, side of the wall, and pose.
 pub(super) fn tables<A: ObstacleArm>(cases: &[WallCase]) -> Result<String, A::Error> {
     let mut outcomes: Vec<Outcome> = Vec::new();
     for (case, is_protected) in cases.iter().flat_map(|case| [(case, false), (case, true)]) {
@@ -270,7 +271,7 @@ pub(super) fn tables<A: ObstacleArm>(cases: &[WallCase]) -> Result<String, A::Er
     Ok(tables.into_iter().flatten().collect::<Vec<_>>().join("\n"))
 }
 
-/// The worst results of the cases with the same key. `None` if all have the same.
+/// The worst results of the cases with the same key. `None` if all cases have the same key.
 fn table(name: &str, outcomes: &[Outcome], key: fn(&WallCase) -> String) -> Option<String> {
     let mut keys: Vec<String> = Vec::new();
     for key in outcomes.iter().map(|(case, ..)| key(case)) {
@@ -295,7 +296,7 @@ fn table(name: &str, outcomes: &[Outcome], key: fn(&WallCase) -> String) -> Opti
     Some(table)
 }
 
-/// The cells of the worst of some results.
+/// The cells of a row: the largest values of some results, and the number of trips.
 fn worst(results: &[WallResult]) -> String {
     let worst = |value: fn(&WallResult) -> u16| results.iter().map(value).max().unwrap_or(0);
     let trips = results.iter().filter(|result| result.has_tripped).count();

@@ -1,10 +1,10 @@
-//! How often a joint was given torque: after three times in a minute it gets none until register 29 is written (D28).
+//! Counts how often a joint is given torque: after three times in a minute it gets none until register 29 is written (D28).
 
 use protocol_core::time::{Duration, Instant};
 
 /// A joint is given torque again at most [`MAX_ATTEMPTS`] times in this time.
 const WINDOW: Duration = Duration::from_millis(60_000);
-/// As [`WINDOW`], less the time from the decision of the controller to its order.
+/// [`WINDOW`] less a margin for the time from a decision of the controller to its torque command.
 const WINDOW_OF_ORDERS: Duration = Duration::from_millis(57_000);
 /// See [`WINDOW`].
 const MAX_ATTEMPTS: usize = 3;
@@ -14,21 +14,21 @@ const MAX_ATTEMPTS: usize = 3;
 pub(super) struct EngagementAttempts {
     /// The latest first.
     at: [Option<Instant>; MAX_ATTEMPTS],
-    /// Those before which the joint had certainly been let go, the latest first.
+    /// The times at which the joint was given torque after it had certainly been let go, the latest first.
     after_let_go: [Option<Instant>; MAX_ATTEMPTS],
-    /// True once all of them were within the window.
+    /// True once all times in `at` were within one window.
     pub(super) is_exhausted: bool,
 }
 
 impl EngagementAttempts {
-    /// The joint is given torque.
+    /// Adds an engagement: the joint is given torque.
     pub(super) fn add(&mut self, now: Instant) {
         self.at.rotate_right(1);
         self.at.first_mut().into_iter().for_each(|first| *first = Some(now));
         self.is_exhausted |= self.at.iter().all(|at| at.is_some_and(|at| now - at < WINDOW));
     }
 
-    /// The joint had certainly been let go, and is given torque. Returns whether that is once too often.
+    /// Adds an engagement after the joint had certainly been let go. Returns true if it is one too many within the window.
     pub(super) fn add_after_let_go(&mut self, now: Instant) -> bool {
         let [first, second, third] = self.after_let_go;
         self.after_let_go = [Some(now), first, second];

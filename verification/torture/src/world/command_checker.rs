@@ -3,10 +3,11 @@
 //! - No goal is out of reach at the allowed speed.
 //! - Goals are sent only in motor state servo, and torque switches follow the motor state.
 //! - Until the end of start-up, and to silent servos, only reads are sent.
-//! - Torque is switched on only where a servo stands, or was read on. After an unanswered question it is read before the
-//!   next goal (D28, D29).
-//! - A joint that lost its torque holds where it gets torque again, unless the host wrote a target meanwhile (D28, D29).
-//! - A goal that no speed allows comes nearer to the measured position, because the joint gives way (D27).
+//! - Torque is switched on only at the position of a servo, and refreshed only after it was read as on. After an unanswered
+//!   read, the torque is read before the next goal (D28, D29).
+//! - A joint that lost its torque holds the position where it gets torque again, unless the host wrote a target meanwhile
+//!   (D28, D29).
+//! - A goal beyond the allowed speed is nearer to the measured position, because the joint gives way (D27).
 
 mod frames;
 mod goals;
@@ -29,14 +30,14 @@ use crate::per_joint::PerJoint;
 use crate::violation::Violation;
 use crate::world_counts::WorldCounts;
 
-/// A joint that had no goal for this long is let go, unless it is silent: an alarm freed it. It is not driven any more.
+/// A joint without a goal for this long, whose servo is not silent, is let go because of an alarm. It is no longer driven.
 const LET_GO_TIME: Duration = Duration::from_millis(10_000);
 
 /// Counts of one control cycle at 372 degrees/s. A set-point may be ahead of the last goal by one cycle, and by one more
 /// for each cycle in which a read delays the goals.
 const ONE_CYCLE: u16 = 19;
 
-/// The commands that the servos have received.
+/// The checker, with the state that follows from the commands and replies so far.
 #[derive(Debug)]
 pub(super) struct CommandChecker {
     codes: TorqueCodes,
@@ -47,16 +48,16 @@ pub(super) struct CommandChecker {
     ranges: PerJoint<Option<ReachableRange>>,
     /// The ranges of joints that get no goals for the time being. Their set-points stand still (D29).
     paused: PerJoint<Option<ReachableRange>>,
-    /// When a joint last got no goal beside others that did.
+    /// When a frame of goals last had no goal for the joint.
     pub(super) paused_at: PerJoint<Instant>,
     /// When a joint last got a goal.
     pub(super) goal_at: PerJoint<Instant>,
     /// The last goal of a joint whose servo was lost, and its tolerance in counts. A found servo may continue from that
     /// goal (D12). The tolerance grows when offsets change.
     kept_goals: PerJoint<Option<(u16, u16)>>,
-    /// The joint had no goal since the start: its first one may be the goal that its servo holds (D12).
+    /// True until the joint has torque from this controller. Until then its goal may be the goal that its servo holds (D12).
     is_first: PerJoint<bool>,
-    /// The joint is not driven any more, whatever its servo does: its next torque is for a new goal.
+    /// True if the joint is no longer driven, whatever its servo does. Its next torque needs a new goal.
     is_released: PerJoint<bool>,
     /// True if the last command switched the torque on. False for a lost servo.
     is_on: PerJoint<bool>,
@@ -119,7 +120,7 @@ impl CommandChecker {
         }
     }
 
-    /// What was checked.
+    /// The number of checked commands and engagements.
     pub(super) fn counts(&self) -> WorldCounts {
         WorldCounts { commands: self.count, engagements: self.engagements, ..WorldCounts::default() }
     }
@@ -149,7 +150,7 @@ impl CommandChecker {
         self.ranges[joint].or(self.paused[joint]).map(|range| range.last_goal)
     }
 
-    /// True if the joint was given torque, or was silent since then.
+    /// True if the joint was given torque and not released, or if its servo was lost since then.
     fn is_driven(&self, joint: Joint) -> bool {
         (self.is_on[joint] && !self.is_released[joint]) || self.kept_goals[joint].is_some()
     }
@@ -159,7 +160,7 @@ impl CommandChecker {
         self.attempts[joint].is_exhausted
     }
 
-    /// The host wrote the target of a joint, which may be let go.
+    /// Records that the host wrote the target of a joint, and whether the joint may be let go at that time.
     pub(super) fn target_written(&mut self, now: Instant, joint: Joint, may_be_let_go: bool) {
         self.target_written_at[joint] = Some(now);
         self.is_written_for_later[joint] = may_be_let_go;
@@ -203,7 +204,7 @@ impl CommandChecker {
     pub(super) fn servo_lost(&mut self, now: Instant, joint: Joint) {
         self.linkage.reset();
         self.servo_lost_at[joint] = Some(now);
-        // A joint that has only its goal has no torque to keep: it engages anew where it is.
+        // A joint that has only a goal has no torque to keep: it engages anew at its position.
         let had_torque = self.is_driven(joint) && now - self.goal_at[joint] < LET_GO_TIME;
         let goal = self.goal(joint).map(|goal| (goal, self.ahead)).or(self.kept_goals[joint]);
         self.kept_goals[joint] = goal.filter(|_| had_torque);
@@ -220,8 +221,8 @@ impl CommandChecker {
         }
     }
 
-    /// Offsets changed: the controller computes its set-points again, from whole counts. Its targets stay in degrees, so
-    /// that they are elsewhere in counts, as after a write.
+    /// Offsets changed: the controller computes its set-points again, from whole counts. Its targets stay the same in degrees,
+    /// so they change in counts, as after a write.
     pub(super) fn offsets_changed(&mut self, now: Instant) {
         self.linkage.reset();
         self.target_written_at = PerJoint::all(Some(now));

@@ -19,7 +19,7 @@ use crate::violation::{Check, Violation, ensure};
 /// The number of outputs after which the controller has to wait. Each waiting request causes at most one output, and
 /// fewer than this many wait.
 const MAX_OUTPUTS: u32 = 4_000;
-/// The number of consecutive waits for a time that has passed.
+/// The number of consecutive waits until a time in the past that is a violation.
 const MAX_EXPIRED_WAITS: u32 = 4;
 
 /// An [`Output`] without a borrow of the controller: its bytes are in [`PoweredArm::output_bytes`].
@@ -64,7 +64,7 @@ impl PoweredArm {
         taken > 0
     }
 
-    /// Every complete request was executed, if the line has been silent for the gap time after it.
+    /// Checks that every complete request was executed, if the line has been silent for the gap time after it.
     fn check_pending(&self, now: Instant, room: usize) -> Check {
         let Some(first) = self.pending.front() else { return Ok(()) };
         let gap = deframer::gap(self.controller.baud());

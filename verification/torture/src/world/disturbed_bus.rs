@@ -32,7 +32,7 @@ use reply_comparison::ReplyComparison;
 const BOOT_TIME: Duration = Duration::from_millis(200);
 /// The longest delay of a reply on the wire.
 const MAX_DELAY: Duration = Duration::from_millis(40);
-/// A joint that is turned faster than this, in counts per second, may be faster than the controller believes (D12): 2,000.
+/// In counts per second. The controller may reject the readings of a joint that turns faster: it believes up to 2,000 (D12).
 const BELIEVED_SPEED: u16 = 1_900;
 /// Kept bytes of an incomplete reply. The longest reply of a servo is shorter.
 const MAX_REPLY: usize = 32;
@@ -49,7 +49,7 @@ pub(super) enum Availability {
 }
 
 impl Availability {
-    /// True if it has replied to every read for a while.
+    /// True if it replies to every read now. The time in `Responding` is in the future while a servo starts.
     fn has_responded(self, now: Instant) -> bool {
         matches!(self, Self::Responding(since) if now >= since)
     }
@@ -90,7 +90,7 @@ pub(super) struct DisturbedBus {
     outran_at: PerJoint<Instant>,
     /// The received part of an incomplete reply.
     partial_reply: Vec<u8>,
-    /// A reply with at most the first delay is in time. From the second delay on, it is a timeout.
+    /// A reply that is late by at most `timely_limit` is in time. From `late_limit` on, its read has timed out.
     timely_limit: Duration,
     late_limit: Duration,
     misreadings: Misreadings,
@@ -227,7 +227,7 @@ impl DisturbedBus {
         bytes
     }
 
-    /// Counts corrupted replies with a valid checksum among the received bytes: one in 256.
+    /// Counts corrupted replies with a valid checksum among the received bytes: one corrupted reply in 256.
     fn count_undetected_errors(&mut self, now: Instant, received: &[u8]) {
         for joint in self.comparison.received(received) {
             self.undetected_errors += 1;

@@ -5,9 +5,9 @@ use std::fmt::{self, Display, Write};
 
 use protocol_core::time::Instant;
 
-/// The entries of each ring.
+/// The largest number of entries in each ring.
 const MAX_ENTRIES: usize = 40;
-/// The bytes of a frame that an entry keeps.
+/// The largest number of bytes of a frame that an entry keeps.
 const MAX_BYTES: usize = 64;
 
 /// Three rings, so that frequent frames do not displace rare events.

@@ -1,4 +1,4 @@
-//! What a write of the extended block means, from docs/protocol.md, section 9.
+//! The effect of a write to the extended block, from docs/protocol.md, section 9.
 
 use motion_core::calibration::{MicroDegrees, angle_from_counts};
 use protocol_core::registers::map::refusal;
@@ -12,12 +12,12 @@ pub(crate) const FINE_TARGETS: (u8, u8) = (128, 142);
 const FINE_POSITIONS: u8 = 142;
 /// The set-point period, two bytes.
 pub(crate) const PERIOD: u8 = 184;
-/// The watchdog of the host link, in units of 10 ms, and what it does: 0 holds, 1 damps (D24).
+/// The timeout of the host-link watchdog, in units of 10 ms, and its action: 0 holds, 1 damps (D24).
 pub(crate) const WATCHDOG: u8 = 186;
 pub(crate) const WATCHDOG_ACTION: u8 = 187;
 /// The limits (D25).
 pub(crate) const LIMITS: u8 = 188;
-/// What a report holds (D26).
+/// The content of a report (D26).
 pub(crate) const REPORT_CONTENT: u8 = 189;
 /// The joints that were measured.
 const MEASURED: u8 = 190;
@@ -62,12 +62,12 @@ pub(crate) fn fine_targets(items: &[(u8, u8)]) -> impl Iterator<Item = (Joint, u
     Joint::ALL.into_iter().filter_map(|joint| Some((joint, word(items, fine_target(joint))?)))
 }
 
-/// Converts a fine target, which is in hundredths of a degree.
+/// Converts a fine target from hundredths of a degree to microdegrees.
 pub(crate) fn angle(hundredths: u16) -> MicroDegrees {
     MicroDegrees(i32::from(hundredths) * 10_000)
 }
 
-/// The fine target that shows an angle of 0 to 180 degrees: the nearest hundredth.
+/// Converts an angle of 0 to 180 degrees to a fine target: the nearest hundredth of a degree.
 pub(crate) fn hundredths(angle: MicroDegrees) -> u16 {
     u16::try_from(angle.0.saturating_add(5_000) / 10_000).unwrap_or(0)
 }
@@ -93,14 +93,14 @@ pub(crate) fn word_of(registers: &RegisterFile, low: u8) -> u16 {
     u16::from_le_bytes([registers.get(low), registers.get(low + 1)])
 }
 
-/// Both views of the present positions agree, and 190 tells which of them were measured (D21).
+/// Checks that both views of the present positions agree, and that register 190 tells which joints were measured (D21).
 pub(crate) fn check_positions(registers: &RegisterFile) -> Check {
     for joint in Joint::ALL {
         let (number, coarse) = (joint.number(), registers.get(54 + joint.index()));
         let is_measured = registers.get(MEASURED) & joint.bit() != 0;
         let fine = fine_position(registers, joint);
         let agrees = match fine {
-            // A half is rounded before it is shown in hundredths.
+            // Each view is rounded by itself, so they differ by up to half a degree.
             Some(fine) => is_measured && fine <= 18_000 && fine.abs_diff(u16::from(coarse) * 100) <= 50,
             None => !is_measured && coarse == 0,
         };
@@ -111,7 +111,7 @@ pub(crate) fn check_positions(registers: &RegisterFile) -> Check {
     Ok(())
 }
 
-/// The fine position of a joint at rest is its position, `counts` (D21).
+/// Checks that the fine position of a joint at rest is its true position, `counts` (D21).
 pub(crate) fn check_position(joint: Joint, counts: u16, offset: i8, registers: &RegisterFile) -> Check {
     let angle = angle_from_counts(joint, counts, offset).0.clamp(0, 180_000_000);
     let fine = fine_position(registers, joint);

@@ -155,7 +155,7 @@ impl TortureWorld {
         });
     }
 
-    /// Moves the hand. It releases a joint that is or may be driven. A silent joint may be driven.
+    /// Moves the hand. The hand releases a joint that is or may be driven: a silent joint may be.
     pub(super) fn move_hand(&mut self) {
         let Some(hand) = self.hand.as_mut().filter(|hand| hand.next_at <= self.now) else { return };
         let is_driven = match &self.power {

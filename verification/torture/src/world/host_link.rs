@@ -12,7 +12,7 @@ fn time_of(bytes: usize, baud: u32) -> Duration {
     Duration::from_micros(nanos.div_ceil(1_000))
 }
 
-/// From the host to the arm. Bytes that the arm has no room for wait.
+/// The direction from the host to the arm. Bytes wait while the arm has no room for them.
 #[derive(Debug)]
 pub(super) struct HostToArm {
     baud: u32,
@@ -76,7 +76,7 @@ impl HostToArm {
     }
 }
 
-/// From the arm to the host: a transmit buffer that drains at the baud rate.
+/// The direction from the arm to the host: a transmit buffer that drains at the baud rate.
 #[derive(Debug)]
 pub(super) struct ArmToHost {
     baud: u32,

@@ -1,6 +1,6 @@
-//! What the servo of a joint truly did: when it lost its torque, and when it pushed too hard.
+//! The true history of a joint's servo: when it lost its torque, and when it pushed too hard.
 //!
-//! The controller follows both late. So each of them tells for some time what the controller may do (D27, D28).
+//! The controller notices both late, so each allows its reaction for some time afterwards (D27, D28).
 
 use motion_core::servo_bus::Torque;
 use motion_core::servo_bus::frame::error;
@@ -8,20 +8,20 @@ use protocol_core::time::{Duration, Instant};
 
 use super::status_reply::StatusFields;
 
-/// The controller finds within this time that a servo has lost its torque, and that it has torque again. Its shell may
-/// stall for five seconds of it.
+/// The controller finds within this time that a servo has lost its torque, and that it has torque again. This includes a
+/// stall of the shell of up to five seconds.
 const NOTICE_TIME: Duration = Duration::from_millis(7_500);
 /// A servo that lost its torque without an alarm gets it again within this time.
 const ENGAGE_TIME: Duration = Duration::from_millis(10_000);
 /// The set-point of a joint that pushed too hard may give way for this time.
 const GIVE_WAY_TIME: Duration = Duration::from_millis(7_000);
-/// The controller measures a push this much too high at most, in 0.1 %: speed and load are not of the same instant.
+/// The largest error by which the controller measures a push too high, in 0.1 %: it samples speed and load at different times.
 const PUSH_ERROR: i16 = 150;
 /// A joint that was let go because of heat may engage again when its servo is 5 degrees cooler (D28). Its limit is 80 degrees
 /// Celsius.
 pub(super) const COOL: u8 = 75;
 
-/// An alarm has been gone for this long when its joint engages again: 500 ms (D28), less what an answer may be late.
+/// The shortest time from the end of an alarm until its joint engages again: 500 ms (D28), less the delay of an answer.
 const ALARM_OVER: Duration = Duration::from_millis(400);
 
 /// The truth about one joint.
@@ -29,21 +29,24 @@ const ALARM_OVER: Duration = Duration::from_millis(400);
 pub(super) struct JointTruth {
     is_on: bool,
     has_power: bool,
-    /// The last loss of power in the motor state servo. A servo that restarts is let go, also if it never had torque (D28).
+    /// The last loss of power in the motor state servo. The joint of a servo that restarts is let go, even if it never had
+    /// torque (D28).
     unpowered_at: Option<Instant>,
     /// The last loss of torque in the motor state servo.
     lost_at: Option<Instant>,
-    /// The last time without torque after a loss.
+    /// The last time without torque.
     off_at: Instant,
-    /// The last alarm, or the last time that the servo was still hot after one. A joint that nothing moves counts as held as long as its servo has an alarm (D28).
+    /// The last alarm, or the last time that the servo was still hot after one. Until the alarm ends, a joint that nothing
+    /// moves counts as held (D28).
     alarm_at: Option<Instant>,
     /// The last answer with an alarm that ends by itself: heat, or a wrong voltage.
     passing_alarm_at: Option<Instant>,
-    /// It has no torque since a disturbance: the controller cannot tell a lost order from lost torque.
+    /// True if the servo has had no torque since a disturbance: the controller cannot tell a lost torque command from lost
+    /// torque.
     lacks_order: bool,
     /// The last push over the limit.
     pushed_at: Option<Instant>,
-    /// Where its servo stands, in counts, and since when.
+    /// The position of the servo in counts, and the time of its last change.
     position: (u16, Instant),
 }
 
@@ -68,7 +71,7 @@ impl JointTruth {
         self.passing_alarm_at.is_none_or(|at| now - at >= ALARM_OVER)
     }
 
-    /// Takes the torque of the servo; `None` without power. `may_miss_orders` tells that frames may be lost, or questions not answered.
+    /// Takes the torque of the servo; `None` without power. `may_miss_orders`: frames may be lost, or reads may stay unanswered.
     pub(super) fn observe(&mut self, now: Instant, torque: Option<Torque>, may_miss_orders: bool) {
         let is_on = torque == Some(Torque::On);
         self.lacks_order = !is_on && (self.lacks_order || may_miss_orders);

@@ -7,15 +7,16 @@ use super::protection_model::{LET_GO, PROTECTION};
 use crate::per_joint::PerJoint;
 use crate::violation::{Check, ensure};
 
-/// A joint that is let go, and whose target was its measured position when this was read first.
+/// A joint that is let go. At the first read of this state, its target was its measured position.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Freed {
     /// Its measured position, and its target, in degrees.
     present: u8,
     target: u8,
-    /// The answer that shows that a servo let go may be newer than the target: the next one moves it.
+    /// True if the target does not follow the position yet: the answer that shows that a servo let go may be newer than the
+    /// target. The next answer moves the target.
     is_behind: bool,
-    /// How often the host had written its target.
+    /// The number of times that the host had written its target.
     writes: u64,
 }
 
@@ -24,11 +25,11 @@ struct Freed {
 pub(super) struct LetGoRule(PerJoint<Option<Freed>>);
 
 impl LetGoRule {
-    /// No joint is let go.
+    /// The rule at the start: no joint is let go.
     pub(super) const NONE: Self = Self(PerJoint::all(None));
 
-    /// Checks the registers, which the host reads now. `writes`: how often the host wrote each target. `keeps_target`: it wrote the last
-    /// one while the joint may have been let go.
+    /// Checks the registers, which the host reads now. `writes` holds how often the host wrote each target. `keeps_target` is
+    /// true for a joint whose last target was written while the joint may have been let go.
     pub(super) fn check(
         &mut self,
         registers: &RegisterFile,
@@ -63,7 +64,8 @@ mod tests {
 
     const JOINT: Joint = Joint::ALL[1];
 
-    /// Joint 2 is let go at 90 degrees, and falls to 80 and 70 degrees, where its target is this. The host has written it so often then.
+    /// Joint 2 is let go at 90 degrees, and falls to 80 and to 70 degrees. There its target is `target`, and the host has
+    /// written it `writes` times.
     fn check(target: u8, writes: u64) -> Check {
         let mut registers = RegisterFile::new([0; 6], None);
         registers.set(PROTECTION, 1);

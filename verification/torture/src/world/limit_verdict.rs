@@ -1,22 +1,22 @@
-//! What the limits say to a write (D25). This file does not know registers.
+//! The verdict of the limits on a write (D25). This file does not know registers.
 
 pub(crate) use crate::linkage_goals::LINKAGE;
 
 /// The largest angle of joint 7, in microdegrees.
 pub(crate) const CLAW: i32 = 84_000_000;
 
-/// What a model can tell about a write.
+/// The verdict of a limit on a write, as far as a model knows it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum LimitVerdict {
     Allowed,
     /// Refused because of this register.
     Refused(u8),
-    /// It depends on set-points or measured targets. If it is refused, this is the register.
+    /// The outcome depends on set-points or measured targets. A refusal would name this register.
     Unknown(u8),
 }
 
-/// The possible outcomes of both limits: the register because of which the write is refused, `None` if it is accepted. The
-/// lowest register counts.
+/// The possible outcomes of a write under both limits: the register that a refusal names, which is the lowest one, or `None`
+/// if the write is accepted.
 pub(crate) fn outcomes([one, other]: [LimitVerdict; 2]) -> Vec<Option<u8>> {
     let of = |verdict| match verdict {
         LimitVerdict::Allowed => vec![None],

@@ -1,4 +1,4 @@
-//! What a write of map 2.1 means, from docs/protocol.md, section 8, and not from the register tables under test.
+//! The effect of a write of map 2.1, from docs/protocol.md, section 8, and not from the register tables under test.
 
 use kinematics::{Vector, ik5, ik6, ik7};
 
@@ -9,7 +9,7 @@ const WRIST: u8 = 68;
 /// The first register of the tip.
 const TIP: u8 = 54;
 
-/// No joint angles reach a position in a write (M7).
+/// A write has a position that no joint angles reach (M7).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct OutOfReach {
     /// The first register of the block.
@@ -97,7 +97,7 @@ fn block<const N: usize>(address: u8, values: &[u8], first: u8) -> Option<[u8; N
     rest.first_chunk().copied()
 }
 
-/// The chip computes in `f32`, too, so that both agree on what is just out of reach.
+/// Uses `f32` as the chip does, so that both agree on positions at the limit of the reach.
 fn position([x1, x0, y1, y0, z1, z0]: [u8; 6]) -> Vector<f32> {
     let millimetres = |high, low| f32::from(u16::from_be_bytes([high, low])) - 1024.0;
     Vector::new(millimetres(x1, x0), millimetres(y1, y0), millimetres(z1, z0))

@@ -1,9 +1,10 @@
-//! Generates the writes of map 2.1, those of the maker's programs among them.
+//! Generates the writes of map 2.1, including the writes of the maker's programs.
 
 use super::host_request::HostRequest;
 use crate::seeded_rng::SeededRng;
 
-/// A write of map 2.1 to the registers of a write of map 2.2. Most writes are such, so that both maps change the same registers.
+/// Converts a write of map 2.2 to a write of the same registers in map 2.1. Most writes are made in this way, so that both
+/// maps change the same registers.
 pub(super) fn of_map22(request: (u8, Vec<u8>)) -> HostRequest {
     let (address, values) = request;
     HostRequest::WriteMap21 { address, values }
@@ -20,7 +21,7 @@ pub(super) fn write(rng: &mut SeededRng) -> HostRequest {
         10 => (82, vec![frequency(rng)]),
         11 => (90, vec![frequency(rng)]),
         12 => (66, vec![rng.up_to(2)]),
-        // The end of the reports of map 2.2.
+        // An empty write, which stops the reports of register 53 (M4).
         13 => (rng.byte(), Vec::new()),
         // A part of the blocks.
         14 => (54 + rng.up_to(19), (0..=rng.below(12)).map(|_| rng.byte()).collect()),
@@ -36,7 +37,7 @@ pub(super) fn settings(rng: &mut SeededRng) -> HostRequest {
         3 => (20, vec![options(rng)]),
         4 => (13 + rng.joint().index(), vec![offset(rng)]),
         5 => (13, offsets(rng)),
-        // As the maker's programs initialise the settings.
+        // The initial settings that the maker's programs write.
         6 => (11, [vec![rng.byte(), rng.up_to(7)], offsets(rng)].concat()),
         _ => (11, [vec![rng.byte(), rng.up_to(8)], offsets(rng), vec![options(rng)]].concat()),
     };
@@ -69,7 +70,7 @@ fn frequency(rng: &mut SeededRng) -> u8 {
     }
 }
 
-/// A position in front of the arm, about every second within its reach; or any.
+/// A position in front of the arm, about half of these within its reach. One in eight is any position.
 fn position(rng: &mut SeededRng) -> Vec<u8> {
     if rng.one_in(8) {
         return (0..6).map(|_| rng.byte()).collect();

@@ -68,7 +68,7 @@ use supply_rule::SupplyRule;
 
 /// The host pauses while this many requests are not executed.
 const MAX_PENDING: usize = 64;
-/// The host pauses while its line has bytes for this time.
+/// The host pauses while the bytes on its line need longer than this.
 const MAX_QUEUE_TIME: Duration = Duration::from_millis(200);
 /// A pause of the host.
 const HOST_PAUSE: Duration = Duration::from_millis(100);
@@ -170,7 +170,7 @@ impl TortureWorld {
             if arm.model.get(PROTECTION) == 1 && arm.status_checker.is_settled(self.now))
     }
 
-    /// The limits of the pushes in 0.1 %, as far as the controller keeps them.
+    /// The push limits in 0.1 %; `None` for a push that the controller does not limit.
     fn push_limits(&self) -> PerJoint<Option<i16>> {
         match &self.power {
             PowerState::On(arm) => PerJoint(Joint::ALL.map(|joint| arm.model.push_limit(joint))),

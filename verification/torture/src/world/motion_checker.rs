@@ -40,7 +40,7 @@ const GOAL_AGE: Duration = Duration::from_millis(100);
 /// When the set-point of a joint that pushes comes back fast, the derivative term of its servo turns the joint away from its
 /// goal for a moment: by this much, in millidegrees.
 const RECOIL: i32 = 2_000;
-/// A joint that something has turned past its goals is back this long after it is gone.
+/// A joint that was turned past its goals is back within this time after the cause is gone.
 const OVERRUN_TIME: Duration = Duration::from_millis(1_000);
 /// A joint that is given torque may still fall, or approach an older goal, for this time.
 const SETTLE_TIME: Duration = Duration::from_millis(200);
@@ -141,7 +141,7 @@ impl MotionChecker {
         Ok(())
     }
 
-    /// A servo that lost its power does not have torque again before it has received a goal.
+    /// Checks that a servo that lost its power has torque again only after it has received a goal.
     fn check_return_of_torque(&mut self, joint: Joint, is_guarded: bool, plant: &Plant) -> Check {
         let bounds = &mut self.joints[joint];
         let has_torque = plant.torque(joint) == Some(Torque::On);
@@ -195,8 +195,8 @@ impl MotionChecker {
 }
 
 /// How far a driven joint may be off its set-point, in millidegrees: by the droop of its own load, and by the distance
-/// in which its motor can stop it. The second one hides no fall: a joint that falls has a smaller torque than its motor,
-/// so it falls further than that distance.
+/// in which its motor can stop it. That distance hides no fall: the load of a falling joint is smaller than the torque of
+/// its motor, so the joint falls further.
 fn yield_of(joint: Joint, plant: &Plant) -> i32 {
     let droop = plant.droop(joint).unwrap_or(i32::MAX);
     droop.saturating_add(plant.stopping_distance(joint))

@@ -1,18 +1,18 @@
-//! What acts on the arm from outside for a time, or once more later.
+//! The end of an influence from outside the arm, or its repetition.
 
 use protocol_core::registers::Joint;
 
-/// What is due at a time.
+/// An event that is due at a later time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Ending {
-    /// The wall goes.
+    /// The wall is removed.
     Wall(Joint),
     /// The push is over.
     Push(Joint),
-    /// The thing goes.
+    /// The thing is removed.
     Thing,
     /// The supply is back.
     Stop,
-    /// The servo has an overload once more.
+    /// The servo has another overload.
     Trip(Joint),
 }

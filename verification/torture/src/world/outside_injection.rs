@@ -1,4 +1,4 @@
-//! Injects what acts on the arm from outside: obstacles, payloads, forced alarms and emergency stops.
+//! Injects influences from outside the arm: obstacles, payloads, forced alarms and emergency stops.
 
 use arm_sim::plant::{Thing, Wall};
 use arm_sim::servo::Trip;
@@ -11,20 +11,20 @@ use crate::scenario::InjectedFault;
 
 /// The longest time of a wall, a push or a thing.
 const LONGEST: Duration = Duration::from_millis(60_000);
-/// The shortest.
+/// The shortest time of a wall, a push or a thing.
 const SHORTEST: Duration = Duration::from_millis(50);
 /// The times of emergency stops, in milliseconds.
 const STOPS: [u64; 3] = [300, 3_000, 30_000];
 /// After an emergency stop, no other fault begins for this time.
 const AFTER_STOP: Duration = Duration::from_millis(3_000);
-/// So often a servo has an overload once more, and the time between two of them: a joint that fell is at rest, and engages, within
-/// it.
+/// The number of repeated overloads of a servo, and the time between two of them. A joint that fell comes to rest and
+/// engages within this time.
 const TRIPS: u8 = 5;
 const TRIP_PERIOD: Duration = Duration::from_millis(6_000);
 /// A wall is at most this far from the joint, in millidegrees.
 const FARTHEST_WALL: i32 = 40_000;
 /// The strongest push on joints 1 to 4 and on joints 5 to 7, in millinewton metres: below the stall torque of their
-/// servos. A stronger one turns a joint faster than the controller believes (D12).
+/// servos. A stronger push turns a joint so fast that the controller rejects its readings (D12).
 const STRONGEST_PUSH: [usize; 2] = [1_500, 250];
 /// The heaviest payload in grams.
 const HEAVIEST: usize = 500;
@@ -53,7 +53,7 @@ impl TortureWorld {
             InjectedFault::Thing => {
                 let [.., claw] = Joint::ALL;
                 let (millidegrees, stiffness) = (self.place(claw), self.stiffness());
-                // The claws close towards smaller angles, and are not inside the thing yet.
+                // The claws close towards smaller angles, and must not be inside the thing yet.
                 if millidegrees < self.bus.angle(claw) {
                     let thing = Thing { millidegrees, stiffness };
                     self.log.event(self.now, format!("{thing:?}"));
@@ -79,7 +79,7 @@ impl TortureWorld {
         }
     }
 
-    /// A place near a joint, in millidegrees.
+    /// A random angle near the angle of a joint, in millidegrees.
     fn place(&mut self, joint: Joint) -> i32 {
         let span = usize::try_from(2 * FARTHEST_WALL).unwrap_or(0);
         let distance = i32::try_from(self.rng.below(span)).unwrap_or(0) - FARTHEST_WALL;
@@ -98,7 +98,7 @@ impl TortureWorld {
         self.endings.push((until, ending));
     }
 
-    /// Ends what is over, and lets servos trip once more.
+    /// Carries out the endings that are due.
     pub(super) fn end_outside(&mut self) {
         while let Some(index) = self.endings.iter().position(|(at, _)| *at <= self.now) {
             let (_, ending) = self.endings.swap_remove(index);
@@ -117,7 +117,7 @@ impl TortureWorld {
         }
     }
 
-    /// When the next of them is due.
+    /// The time of the next ending.
     pub(super) fn next_ending(&self) -> Instant {
         self.endings.iter().map(|(at, _)| *at).min().unwrap_or(Instant::FAR_FUTURE)
     }
@@ -133,7 +133,7 @@ impl TortureWorld {
         }
     }
 
-    /// Lets a servo have so many overloads that its joint may not engage any more (D28). The host orders nothing meanwhile.
+    /// Repeats the overload of a servo until its joint may no longer engage (D28). The host only reads meanwhile.
     fn trip_again_and_again(&mut self, joint: Joint) {
         let mut at = self.now;
         for _ in 0..TRIPS {

@@ -46,7 +46,7 @@ impl WorldParameters {
         }
     }
 
-    /// Up to the first delay every reply of a servo is in time. From the second delay on, none is.
+    /// The largest delay with which every reply of a servo is in time, and the smallest delay with which each is too late.
     pub(super) fn reply_time_bounds(&self) -> [Duration; 2] {
         let timeout = self.servo_timeout.as_micros();
         let late = timeout + self.jitter.as_micros() + 2_000;

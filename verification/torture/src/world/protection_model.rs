@@ -1,4 +1,4 @@
-//! What the registers of the protection block mean, from docs/protocol.md.
+//! The meaning of the registers of the protection block, from docs/protocol.md.
 
 use protocol_core::registers::Joint;
 use protocol_core::registers::map::EFFECTOR_TYPE;

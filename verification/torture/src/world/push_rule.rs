@@ -1,7 +1,7 @@
-//! No servo's own overload protection ever acts while the controller limits its push, and no push lasts (D27).
+//! Checks that no servo's own overload protection acts while the controller limits its push, and that no push lasts (D27).
 //!
 //! The rule binds while the controller can limit: the servo responds, the bus is undisturbed, the shell runs, and the limit
-//! is one up to which D27 holds.
+//! is at most 75 %.
 
 use protocol_core::registers::Joint;
 use protocol_core::time::{Duration, Instant};
@@ -10,22 +10,22 @@ use crate::violation::{Check, ensure};
 
 /// Up to this limit in 0.1 % of the stall torque no servo switches itself off (D27).
 const HIGHEST_LIMIT: i16 = 750;
-/// The controller has to have been able to limit for this time.
+/// The rule binds after the controller has been able to limit for this time.
 const ABLE_FOR: Duration = Duration::from_millis(2_500);
 /// A push over the limit ends within this time, on a bus with long timeouts, too.
 const LASTS_FOR: Duration = Duration::from_millis(1_000);
 /// A push counts from this much over its limit, in 0.1 %: 5 % are allowed (D27), and the average of 100 ms ripples.
 const TOLERANCE: i16 = 150;
 
-/// A joint that is turned against its push at this share of its highest speed gives way already, in 0.1 %: 15 degrees/s.
+/// A joint that is turned against its push faster than this already gives way. In 0.1 % of the highest speed: 15 degrees/s.
 const GIVES_WAY: i16 = 40;
 
-/// The truth about a joint at this time.
+/// The true push and speed of a joint.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Push {
-    /// In 0.1 % of the stall torque.
+    /// The push in 0.1 % of the stall torque.
     pub(super) permille: i16,
-    /// The speed in 0.1 % of the highest one. Its sign is that of the push if both have the same direction.
+    /// The speed in 0.1 % of the highest speed. It has the sign of the push if both have the same direction.
     pub(super) speed: i16,
     /// The limit; `None` if the controller cannot limit.
     pub(super) limit: Option<i16>,

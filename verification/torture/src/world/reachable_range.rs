@@ -28,7 +28,7 @@ impl ReachableRange {
         Self { upper: position, lower: position, last_goal: goal, speed: limit(joint, speed), at: now }
     }
 
-    /// A written speed is allowed until the next goal, even if another write replaces it.
+    /// Allows a written speed until the next goal, even if another write replaces it.
     pub(super) fn allow_speed(&mut self, joint: Joint, speed: u8) {
         self.speed = self.speed.max(limit(joint, speed));
     }

@@ -1,4 +1,4 @@
-//! A model of the registers, from docs/protocol.md alone, without measured values such as positions.
+//! A model of the registers, written only from docs/protocol.md, without measured values such as positions.
 
 mod comparison;
 pub(crate) mod limits;
@@ -59,7 +59,7 @@ pub(crate) struct RegisterModel {
     /// The targets as the host wrote them, while no measured position can have replaced them.
     pub(crate) targets: PerJoint<Option<MicroDegrees>>,
     has_streams: bool,
-    /// The last targets in degrees that were no points of a stream: a joint that is let go takes these alone (D28).
+    /// The last targets that were not points of a stream, in degrees. A joint that is let go takes only these (D28).
     firm_targets: PerJoint<u8>,
     /// How often the host wrote each target.
     pub(crate) target_writes: PerJoint<u64>,
@@ -67,9 +67,10 @@ pub(crate) struct RegisterModel {
     pub(crate) held_targets: PerJoint<Option<u8>>,
     /// The targets that the arm may have set itself (D27, D28).
     pub(crate) own_targets: PerJoint<OwnTarget>,
-    /// The outcome of the next write, where the arm's registers have told it: the register because of which it is refused.
+    /// The outcome of the next write, if it is known from the arm's registers: the register that the refusal names, or
+    /// `Some(None)` if the limits allow the write.
     pub(crate) told: Option<Option<u8>>,
-    /// The possible outcomes of the last request.
+    /// The possible outcomes of the last request under the limits.
     outcomes: Vec<Option<u8>>,
 }
 
@@ -323,7 +324,7 @@ impl RegisterModel {
         [FEEDBACK_FREQUENCY.address, ANGLE_FREQUENCY, LOAD_FREQUENCY].map(|at| self.get(at))
     }
 
-    /// What the reports of register 53 hold (D26).
+    /// The content of the reports of register 53: register 189 (D26).
     pub(crate) fn report_content(&self) -> u8 {
         self.get(extended_model::REPORT_CONTENT)
     }

@@ -8,11 +8,11 @@ use crate::violation::{Check, ensure};
 /// A stream of reports.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum ReportStream {
-    /// Of register 53.
+    /// The reports of register 53.
     Positions,
-    /// Of register 82.
+    /// The reports of register 82.
     Angles,
-    /// Of register 90.
+    /// The reports of register 90.
     Loads,
 }
 
@@ -41,7 +41,7 @@ impl ReportStream {
 /// The reports of a stream since the last change of its frequency.
 #[derive(Clone, Copy, Debug)]
 struct ReportCount {
-    /// In Hz.
+    /// The frequency in Hz, limited to the capacity of the line (D14, M4).
     frequency: u32,
     since: Instant,
     count: u64,
@@ -107,7 +107,8 @@ impl ReportCount {
     }
 }
 
-/// The frequencies on a line for `most` reports a second. Those of map 2.1 share it in their ratio, at least 1 Hz each.
+/// Limits the frequencies to the capacity of the line, in reports a second: `most_positions` for register 53, and `most` for
+/// the two streams of map 2.1 together. These share it in their ratio, at least 1 Hz each.
 fn limited([positions, angles, loads]: [u32; 3], [most_positions, most]: [u32; 2]) -> [u32; 3] {
     let sum = angles + loads;
     let share = |wanted: u32| match (wanted * most).checked_div(sum) {

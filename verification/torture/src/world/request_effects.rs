@@ -43,7 +43,7 @@ impl TortureWorld {
             let has_output = !matches!(last, None | Some(RequestEffect::NoReply { .. }));
             ensure(!has_output, || format!("the output of {last:?} is missing before {request:?}"))?;
             arm.model.told = outcomes.next();
-            // In a poll, writes have their turn before the watchdog, and a read has it after.
+            // In a poll, the controller executes writes before the watchdog acts, and a read after it.
             if request.is_read() {
                 self.let_watchdog_act(arm);
             }
@@ -101,8 +101,8 @@ impl TortureWorld {
         }
     }
 
-    /// The arm may set these targets itself: a servo held a goal at the start (D12), a joint gives way (D27), or is let go
-    /// (D28).
+    /// Tells the model which targets the arm may set itself: a servo held a goal at the start (D12), or a joint gives way
+    /// (D27) or is let go (D28).
     fn allow_own_targets(&self, arm: &mut PoweredArm) {
         for joint in Joint::ALL {
             let held_goal = arm.command_checker.held_goal(joint);
@@ -133,7 +133,7 @@ impl TortureWorld {
         }
     }
 
-    /// The arm enters state 0 if the supply of its servos was lost (D29): the model takes over the effect.
+    /// If the arm has entered state 0 because the supply of its servos was lost (D29), the model takes over the effect.
     fn record_lost_supply(&mut self, arm: &mut PoweredArm) -> Check {
         let is_told = arm.controller.registers().get(SUPPLY_LOST) == 1;
         if !is_told || arm.model.get(SUPPLY_LOST) == 1 {
@@ -146,7 +146,7 @@ impl TortureWorld {
         Ok(())
     }
 
-    /// The arm has entered state 0 by itself.
+    /// Tells the checkers that the arm has entered state 0 by itself.
     fn record_damping(&mut self, arm: &mut PoweredArm) {
         arm.status_checker.state_written(self.now);
         arm.command_checker.state_changed();

@@ -11,20 +11,20 @@ use super::host_request::{HostRequest, SentStream};
 use super::{extended_requests, map21_requests};
 use crate::seeded_rng::SeededRng;
 
-/// A pause inside a frame. From 100 ms on the arm drops the frame.
+/// The longest pause inside a frame. From 100 ms on, the arm drops the frame.
 const MAX_PAUSE: Duration = Duration::from_millis(90);
 
 /// The first and last address of the extended block and the protection block.
 const EXTENDED: (usize, usize) = (128, 199);
 
-/// What the host of a world sends.
+/// The kinds of requests that the host of a world sends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct HostHabits {
     /// Half of the writes are in map 2.1. The other worlds have map 2.2 only.
     both_maps: bool,
     /// A quarter of the other writes are in the extended block.
     extended_block: bool,
-    /// Half of the time it only reads.
+    /// The host only reads for half of the time.
     pauses: bool,
 }
 

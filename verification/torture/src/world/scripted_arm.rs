@@ -1,4 +1,4 @@
-//! A controller that does what a test says, in front of simulated servos and of the rules for commands and motion.
+//! A controller that is scripted by a test, with simulated servos and the checkers of commands and motion.
 
 use arm_sim::servo::ServoConfig;
 use motion_core::servo_bus::Torque;
@@ -16,11 +16,11 @@ use crate::per_joint::PerJoint;
 use crate::seeded_rng::SeededRng;
 use crate::violation::Check;
 
-/// The timeout of a question.
+/// The timeout of a read.
 const TIMEOUT: Duration = Duration::from_millis(3);
-/// The registers of a reading.
+/// The number of registers in a reading.
 const READING: u8 = 8;
-/// The registers from the torque switch to the end of a reading.
+/// The number of registers from the torque switch to the end of a reading.
 const WITH_TORQUE: u8 = 24;
 
 /// The arm of a test. Its first joint carries no weight.
@@ -57,7 +57,7 @@ impl ScriptedArm {
         arm
     }
 
-    /// An arm of which this joint is engaged where it stands.
+    /// An arm with this joint engaged at its position.
     pub(super) fn with_engaged(joint: Joint) -> Self {
         let mut arm = Self::started();
         arm.engage(joint).unwrap();
@@ -125,7 +125,7 @@ impl ScriptedArm {
         self.send(&torque_frame(joint, torque))
     }
 
-    /// Engages a joint where it stands.
+    /// Engages a joint at its position.
     pub(super) fn engage(&mut self, joint: Joint) -> Check {
         self.ask(joint)?;
         self.goal(joint, self.bus.position(joint))?;
@@ -134,7 +134,7 @@ impl ScriptedArm {
         self.ask(joint)
     }
 
-    /// What the status rules see.
+    /// The context of the status checks.
     pub(super) fn status(&self) -> StatusContext<'_> {
         let Self { now, registers, model, bus, checker, .. } = self;
         let watchdog = &WatchdogModel::OFF;

@@ -1,4 +1,4 @@
-//! What the controller can know of each servo from its replies.
+//! The state of each servo as the controller can know it from the replies.
 
 use motion_core::TorqueCodes;
 use motion_core::servo_bus::Torque;
@@ -11,24 +11,25 @@ use crate::per_joint::PerJoint;
 
 /// Start-up ends if each servo has sent this many replies.
 const START_UP_REPLIES: u8 = 2;
-/// After all servos were silent for a second, they restarted (D29). The first question fails later than it was sent.
+/// Servos that were silent for a second count as restarted (D29). The margin of 100 ms is for the controller, whose second
+/// does not start when a read is sent, but when it fails.
 const LOST_AFTER: Duration = Duration::from_millis(900);
-/// So long after a silence its end may still matter.
+/// The end of a silence may have effects for this long.
 const NOTICE_TIME: Duration = Duration::from_millis(3_000);
-/// A joint is let go once its torque was read off this often: one reading may be false.
+/// A joint is let go once its torque was read as off this many times: one reading may be false.
 const LOST_BY: u8 = 2;
 
-/// The registers of a reading.
+/// The number of registers in a reading.
 const READING: usize = 8;
 
-/// What is known of one servo.
+/// The knowledge about one servo.
 #[derive(Clone, Copy, Debug, Default)]
 struct Known {
     replies: u8,
     /// Reads since the last reply.
     unanswered: u8,
     asked_at: Instant,
-    /// The registers of the last read. A late reply to an earlier read may have another length.
+    /// The number of registers in the last read. A late reply to an earlier read may have another length.
     asked_count: u8,
     /// The first read of the present silence.
     silent_since: Option<Instant>,
@@ -36,30 +37,30 @@ struct Known {
     silence: (Instant, Instant),
     /// A driven servo left a question unanswered, and its torque was not read since then.
     is_doubtful: bool,
-    /// It was driven when it was asked and answered last, or before its silence.
+    /// True if the servo was driven at the last read that no unanswered read preceded.
     is_driven: bool,
-    /// Its torque was read on since it was last switched on.
+    /// True if its torque was read as on since it was last switched on or refreshed.
     is_read_on: bool,
-    /// Its torque was read off last.
+    /// True if its torque was off when it was last read.
     is_read_off: bool,
-    /// How often its torque was read off without a reading that it is on.
+    /// How many times in a row its torque was read as off.
     offs: u8,
     /// As `offs`, without the first answers after a silence, which the controller may not accept.
     taken_offs: u8,
-    /// Its torque was read off [`LOST_BY`] times since it was last given torque.
+    /// True if its torque was read as off [`LOST_BY`] times in a row since it was last given torque.
     was_lost: bool,
-    /// When its torque was read after that, and how often that happened since its last goal.
+    /// When a read of its torque last ended a doubt, and how many doubts ended since its last goal.
     trusted_at: Instant,
     ended_doubts: u64,
     /// The goal that it held with torque when its torque was read last, in counts.
     held_goal: Option<u16>,
-    /// In counts.
+    /// The last measured position, in counts.
     position: Option<u16>,
-    /// The lowest and the highest position since the last goal, and before it since the goal before, in counts.
+    /// The lowest and the highest position in counts: since the last goal, and between the two goals before.
     positions: [Option<(u16, u16)>; 2],
 }
 
-/// What is known of all servos.
+/// The knowledge about all servos.
 #[derive(Clone, Debug)]
 pub(super) struct ServoReplies {
     codes: TorqueCodes,
@@ -93,7 +94,7 @@ impl ServoReplies {
         self.asked = Some(joint);
         let mut driven = self.servos.0.iter().filter(|servo| servo.is_driven).peekable();
         self.was_outage |= driven.peek().is_some() && driven.all(|servo| servo.is_lost(now));
-        // The controller does the same: bytes from before a read are not its reply.
+        // The controller does the same: bytes that came before a read are not its reply.
         self.decoder.clear();
     }
 
@@ -129,8 +130,8 @@ impl ServoReplies {
         self.servos[joint].position
     }
 
-    /// The lowest and the highest measured positions from which the next goal may be calculated. A position just before the last
-    /// goal came too late for that one: goals are calculated in each control cycle.
+    /// The lowest and the highest measured positions from which the next goal may be computed. A position just before the last
+    /// goal may have come too late for that goal: goals are computed once in each control cycle.
     pub(super) fn positions(&self, joint: Joint) -> impl Iterator<Item = u16> {
         self.servos[joint].positions.into_iter().flatten().flat_map(|(lowest, highest)| [lowest, highest])
     }
@@ -151,8 +152,9 @@ impl ServoReplies {
         self.servos[joint].is_doubtful
     }
 
-    /// For how long the set-point of a joint may have moved since the last goal of its servo. It moves from that goal and
-    /// from the end of each doubt until a question fails, which takes at most `until_doubt`. Call it for each goal.
+    /// For how long the set-point of a joint may have moved since the last goal of its servo. It moves after that goal and
+    /// after the end of each doubt until a read fails, which takes at most `until_doubt`. Has to be called for each goal,
+    /// because it resets the number of ended doubts.
     pub(super) fn take_trusted_time(
         &mut self,
         joint: Joint,
@@ -166,7 +168,7 @@ impl ServoReplies {
         Duration::from_micros(phases * until_doubt.as_micros() + last.as_micros())
     }
 
-    /// The joint is given torque where it was measured, or is not driven any more.
+    /// Forgets doubts and torque readings: the joint is given torque at its measured position, or is no longer driven.
     pub(super) fn forget_doubt(&mut self, joint: Joint) {
         let servo = &mut self.servos[joint];
         (servo.is_doubtful, servo.is_read_on, servo.is_read_off) = (false, false, false);
@@ -174,7 +176,7 @@ impl ServoReplies {
         servo.is_driven = false;
     }
 
-    /// True if the torque was read on since the last call.
+    /// True if the torque was read as on since the last call.
     pub(super) fn take_read_on(&mut self, joint: Joint) -> bool {
         std::mem::take(&mut self.servos[joint].is_read_on)
     }
@@ -189,7 +191,7 @@ impl ServoReplies {
         self.servos[joint].was_lost
     }
 
-    /// True if a silence of a second or longer ended a moment ago.
+    /// True if a silence of at least [`LOST_AFTER`] ended less than [`NOTICE_TIME`] ago.
     pub(super) fn was_silent_for_a_second(&self, joint: Joint, now: Instant) -> bool {
         let (start, end) = self.servos[joint].silence;
         end - start >= LOST_AFTER && now - end < NOTICE_TIME
@@ -200,12 +202,12 @@ impl ServoReplies {
         self.was_outage
     }
 
-    /// The host wrote the motor state: what happened before does not matter any more.
+    /// Forgets an outage, because the host has written the motor state since then.
     pub(super) const fn forget_outage(&mut self) {
         self.was_outage = false;
     }
 
-    /// True if the servo has answered for a while.
+    /// True if the last silence of the servo ended more than [`NOTICE_TIME`] ago.
     pub(super) fn is_steady(&self, joint: Joint, now: Instant) -> bool {
         let servo = &self.servos[joint];
         servo.silent_since.is_none() && now - servo.silence.1 > NOTICE_TIME

@@ -132,7 +132,7 @@ impl<const SECTOR: usize> FlashSettings<SECTOR> {
         self.flash.0.borrow().flash.is_powered()
     }
 
-    /// Only a worn or full flash may refuse settings.
+    /// Checks that only a worn or full flash refuses settings.
     fn check_storage(&self, storage: Storage) -> Check {
         let early = storage == Storage::Full && SECTOR == BOARD_SECTOR && self.saves < MIN_SAVES;
         ensure(self.is_worn || storage != Storage::Broken && !early, || {

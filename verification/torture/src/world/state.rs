@@ -42,7 +42,7 @@ pub struct TortureWorld {
     pub(super) stalled_until: Instant,
     pub(super) next_fault_at: Instant,
     pub(super) hand: Option<Hand>,
-    /// What ends later.
+    /// The later events of obstacles, pushes and faults from outside, each with its time.
     pub(super) endings: Vec<(Instant, Ending)>,
     pub(super) supply_rule: SupplyRule,
     pub(super) log: EventLog,

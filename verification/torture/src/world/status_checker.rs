@@ -149,7 +149,7 @@ impl StatusChecker {
         ensure(open <= MAX_VALVE_TIME, || format!("the valve has been open for {} us", open.as_micros()))
     }
 
-    /// The time since the last stall, start, and the time `then`.
+    /// The time since the latest of three times: the start, the end of the last stall, and `then`.
     fn settled_time(&self, now: Instant, then: Instant) -> Duration {
         now - then.max(self.unsettled_at)
     }
@@ -179,7 +179,7 @@ impl StatusChecker {
         ensure(is_right, || format!("no servo measured the supply {supply}"))
     }
 
-    /// Counters only increase, and do not change without an error.
+    /// Checks that counters only increase, and do not change without an error.
     fn check_counters(&mut self, context: &StatusContext<'_>) -> Check {
         let corrupted = counter(context.registers, &FRAMES_CORRUPTED);
         let more = corrupted.wrapping_sub(std::mem::replace(&mut self.corrupted, corrupted));

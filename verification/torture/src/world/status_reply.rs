@@ -33,13 +33,13 @@ pub(super) fn measurements(params: &[u8]) -> Option<&[u8]> {
     params.get(first..)
 }
 
-/// The torque switch in the parameters of a status reply, if the question asked for it.
+/// The torque switch in the parameters of a status reply, if the read included it.
 pub(super) fn torque_switch(params: &[u8]) -> Option<u8> {
     params.first().copied().filter(|_| has_torque_switch(params))
 }
 
-/// The goal in the parameters of a status reply in counts, if the question asked for the torque switch. A goal that was damaged on
-/// the wire may be beyond the end of the servo, which then goes to its end.
+/// The goal in the parameters of a status reply in counts, if the read included the torque switch. A goal that was corrupted
+/// on the wire may be beyond the end of the servo's range. The servo then goes to that end.
 pub(super) fn goal(params: &[u8]) -> Option<u16> {
     let &[_, _, high, low, ..] = params else { return None };
     has_torque_switch(params).then_some(u16::from_be_bytes([high, low]).min(Reading::MAX_POSITION))

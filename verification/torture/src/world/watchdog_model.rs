@@ -42,14 +42,14 @@ impl WatchdogModel {
         may_act
     }
 
-    /// Fault bit 6 is set only after a silence.
+    /// Checks that fault bit 6 is set only after a silence.
     pub(crate) fn check_fault(&self, registers: &RegisterFile) -> Check {
         let is_set = registers.get(FAULTS.address) & fault::HOST_SILENT != 0;
         ensure(!is_set || self.may_have_acted, || "the watchdog acted without a silence".to_owned())
     }
 
-    /// The watchdog has acted if the silence is long enough. The shell has run without a stall since `unsettled_at`. The
-    /// joints of the bits `own` may give way to an obstacle meanwhile.
+    /// Checks that the watchdog has acted if the silence is long enough. The shell has run without a stall since
+    /// `unsettled_at`. The joints in the bits of `own` may be moving for another reason, such as an obstacle.
     pub(crate) fn check(
         &self,
         now: Instant,

@@ -10,9 +10,9 @@ use crate::per_joint::PerJoint;
 /// The targets that a write sets.
 pub(crate) struct WrittenTargets<'a> {
     pub(crate) items: &'a [(u8, u8)],
-    /// By inverse kinematics.
+    /// The targets from inverse kinematics.
     pub(crate) reached: PerJoint<Option<MicroDegrees>>,
-    /// The first register of the position.
+    /// The first register of the position from which `reached` was computed.
     pub(crate) block: u8,
 }
 
@@ -22,7 +22,7 @@ impl WrittenTargets<'_> {
         self.items.iter().find(|(at, _)| *at == wanted).map(|(_, value)| *value)
     }
 
-    /// The target of a joint. The last of several counts.
+    /// The target of a joint. If the write sets several, the arm applies them in the order coarse, fine, inverse kinematics.
     pub(crate) fn of(&self, joint: Joint) -> Option<MicroDegrees> {
         let fine = || extended_model::fine_targets(self.items).find(|(of, _)| *of == joint);
         let fine = || fine().map(|(_, hundredths)| extended_model::angle(hundredths));

@@ -1,6 +1,6 @@
 //! `cargo xtask bench --programs`: size, start and round trip of the host programs, and the load of many arms in one simulator.
 //!
-//! The programs are those beside this one, of the same build.
+//! The measured programs are in the folder of this one, from the same build.
 
 mod simulator;
 
@@ -48,7 +48,7 @@ fn beside_this(program: &str) -> Outcome<PathBuf> {
     Ok(env::current_exe()?.with_file_name(program))
 }
 
-/// The run times of a program.
+/// The run times of a program, each from its start to its end.
 fn starts(program: &Path, arguments: &[&str]) -> Outcome<Vec<Duration>> {
     let run = || {
         let start = Instant::now();
@@ -118,7 +118,7 @@ struct ArmsLoad {
     /// Shares of a core while the arms are idle, and while a host polls each of them.
     idle: f64,
     busy: f64,
-    /// How often it polls each, in Hz.
+    /// How often the host polls each arm, in Hz.
     rate: f64,
     kibibytes: u64,
 }

@@ -21,11 +21,11 @@ pub(crate) type Outcome<T = ()> = Result<T, Box<dyn Error>>;
 
 /// The time of a measurement.
 const WATCH_TIME: Duration = Duration::from_secs(5);
-/// The time for the start of the servos, and for steady polling.
+/// The time to wait until the servos have started, and until the polling is steady.
 const START_TIME: Duration = Duration::from_secs(2);
 /// The period of a host at 100 Hz.
 const PERIOD: Duration = Duration::from_millis(10);
-/// The shortest period for each arm, so that this program does not limit the rate.
+/// The polling period is at least this long per arm, so that this program does not limit the rate.
 const PERIOD_PER_ARM: Duration = Duration::from_micros(100);
 /// The timeout of a reply, on a busy machine.
 const TIMEOUT: Timespec = Timespec { tv_sec: 20, tv_nsec: 0 };
@@ -40,7 +40,7 @@ pub(crate) struct Simulator {
 
 impl Drop for Simulator {
     fn drop(&mut self) {
-        // An error means that it has ended.
+        // An error means that the process has ended.
         let _ = self.process.kill();
         let _ = self.process.wait();
     }
@@ -77,14 +77,14 @@ impl Simulator {
         self.ports.first().map_or(Path::new(""), PathBuf::as_path)
     }
 
-    /// The processor time of its only thread.
+    /// The processor time of the simulator's only thread.
     fn time_on_core(&self) -> Outcome<Duration> {
         let text = fs::read_to_string(format!("/proc/{}/schedstat", self.process.id()))?;
         let nanos = text.split_whitespace().next().ok_or("no time in schedstat")?;
         Ok(Duration::from_nanos(nanos.parse()?))
     }
 
-    /// Its anonymous memory in KiB.
+    /// The simulator's anonymous memory in KiB.
     pub(crate) fn memory(&self) -> Outcome<u64> {
         let text = fs::read_to_string(format!("/proc/{}/smaps_rollup", self.process.id()))?;
         let line = text.lines().find_map(|line| line.strip_prefix("Anonymous:")).ok_or("no memory")?;

@@ -12,7 +12,7 @@ use fastrand::Rng;
 use methods::{CYCLE, METHODS, Method, OURS, SetPoints};
 use sine::SineTargets;
 
-/// Degrees per second. Ten minutes stay below the largest angle of motion-core.
+/// Degrees per second. The angle after ten minutes is still below the largest angle of motion-core.
 const VELOCITY: f64 = 3.0;
 /// Runs of each scenario, each with its own seed and phase of the control cycles.
 const RUNS: u64 = 20;
@@ -20,7 +20,7 @@ const PERIODS: [f64; 5] = [0.005, 0.01, 0.02, 0.05, 0.1];
 /// A method has settled after this many points.
 const SETTLING_POINTS: usize = 40;
 
-/// How the frames of a stream come.
+/// How the frames of a stream arrive.
 #[derive(Clone, Copy)]
 struct StreamScenario {
     name: &'static str,
@@ -55,14 +55,14 @@ const SCENARIOS: [StreamScenario; 8] = [
     },
 ];
 
-/// Of one run, or the worst of several.
+/// The figures of one run, or the worst figures of several runs.
 #[derive(Clone, Copy, Default)]
 struct StreamFigures {
     /// The largest deviation from the velocity of the motion, in percent.
     ripple: f64,
     /// The root of the mean square of that deviation, in percent.
     rms: f64,
-    /// The mean time from when a point was to be sent to when the set-point passes it, in periods.
+    /// The mean time from the planned sending of a point until the set-point passes it, in periods.
     delay: f64,
     /// How far the set-points go past the last point, in percent of the distance between two points.
     overshoot: f64,
@@ -124,7 +124,7 @@ fn worst(method: &Method, scenario: &StreamScenario, period: f64) -> StreamFigur
         .fold(StreamFigures::default(), StreamFigures::worst)
 }
 
-/// A frame: when it comes, when it was to be sent, and its angle.
+/// A frame with one point: its arrival and its planned sending in seconds, and its angle in degrees.
 struct PointFrame {
     comes: f64,
     planned: f64,
@@ -164,12 +164,12 @@ fn one_run(method: &Method, scenario: &StreamScenario, period: f64, seed: u64) -
     }
 }
 
-/// What the set-points of one run did after the method had settled.
+/// The motion of the set-points of one run, after the method had settled.
 #[derive(Default)]
 struct Track {
-    /// Of each control cycle between the points, as a part of the velocity of the motion.
+    /// The velocity in each control cycle between the points, as a part of the velocity of the motion.
     velocities: Vec<f64>,
-    /// From when a point was to be sent to when the set-point passed it, in seconds.
+    /// The time from the planned sending of each point until the set-point passed it, in seconds.
     delays: Vec<f64>,
     /// How far the set-points went past the last point, in degrees.
     overshoot: f64,

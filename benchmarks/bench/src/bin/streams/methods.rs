@@ -1,5 +1,5 @@
-//! Ways to make set-points from a stream of points: this project's, simpler ones, and those of other projects by their
-//! published rules.
+//! Methods to make set-points from a stream of points: this project's, simpler ones, and methods of other projects,
+//! implemented from their published rules.
 
 use std::collections::VecDeque;
 
@@ -9,12 +9,12 @@ use protocol_core::time::{Duration, Instant};
 
 /// Seconds between two set-points.
 pub(super) const CYCLE: f64 = 0.01;
-/// The speed of a joint without an order to be slower, in degrees per second.
+/// The speed of a joint whose speed register is 0, in degrees per second (D10).
 const FASTEST: f64 = 372.0;
 
 /// Makes set-points from points. Times are in seconds, angles in degrees.
 pub(super) trait SetPoints {
-    /// A point's frame came at `now`. `velocity` is that of the motion, for methods that need it.
+    /// The frame of a point arrived at `now`. `velocity` is the velocity of the motion, for methods that need it.
     fn point(&mut self, now: f64, angle: f64, velocity: f64);
     /// The set-point at the end of a control cycle.
     fn step(&mut self, now: f64) -> f64;
@@ -94,7 +94,7 @@ impl SetPoints for Newest {
     }
 }
 
-/// Goes to each point in one period from when its frame came.
+/// Goes to each point in one period, from the arrival of its frame on.
 #[derive(Default)]
 struct OnePeriod {
     period: f64,
@@ -135,7 +135,8 @@ impl Segment {
     }
 }
 
-/// Starts when two points wait, and takes one each period of its own clock. Without a point it stops, and begins anew.
+/// Starts when two points wait, and takes one each period of its own clock. Without a point it stops, and again waits for
+/// two.
 struct Queue {
     period: f64,
     waiting: VecDeque<f64>,

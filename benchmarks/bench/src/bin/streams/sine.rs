@@ -24,7 +24,7 @@ const JITTER: f64 = 0.25;
 /// Seconds before the sine, and its length.
 const START: f64 = 3.0;
 const LENGTH: f64 = 10.0;
-/// The end of a recording.
+/// The end of a recording, in seconds.
 const END: f64 = START + LENGTH + 1.0;
 /// Seconds between two samples of the arm.
 const SAMPLE: f64 = 0.002;

@@ -49,7 +49,7 @@ impl ControllerLoop {
         self.waiting.extend(bytes);
     }
 
-    /// Sleeps until the deadline and runs the loop, this often.
+    /// Sleeps until the deadline and runs the loop, `count` times.
     pub fn run(&mut self, count: usize) {
         for _ in 0..count {
             self.now_us = self.now_us.max(self.wake_at.as_micros());
@@ -62,7 +62,7 @@ impl ControllerLoop {
         self.controller.servo_bytes(Instant::from_micros(self.now_us), bytes);
     }
 
-    /// Runs the loop once: the controller waits after a bounded number of polls.
+    /// Runs the loop until the controller waits. Panics if it does not wait after a bounded number of polls.
     pub fn run_once(&mut self) {
         // Every frame may need a poll, and so may every byte behind a false header.
         let max_polls = 100 + self.waiting.len();
@@ -81,7 +81,7 @@ impl ControllerLoop {
         panic!("no wait after {max_polls} polls");
     }
 
-    /// Polls once. Returns the deadline of a wait.
+    /// Polls once. Returns the deadline if the controller waits.
     fn poll(&mut self) -> Option<Instant> {
         let now = Instant::from_micros(self.now_us);
         match self.controller.poll(now, self.room) {

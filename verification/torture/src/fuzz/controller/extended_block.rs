@@ -1,4 +1,4 @@
-//! What a reply with registers of the extended block holds, whatever was written before (D21).
+//! Checks the registers of the extended block that a reply shows, after any writes (D21).
 
 use protocol_core::registers::map::{
     FINE_POSITION, FINE_TARGET, MEASURED_JOINTS, PRESENT_POSITION, TARGET_POSITION,
@@ -10,8 +10,8 @@ const MAX_HUNDREDTHS: u16 = 18_000;
 /// A fine position before the first reading.
 const UNKNOWN: u16 = 65_535;
 
-/// Checks the registers behind a reply of `count` registers from `address` on. The arm computes the extended block only for
-/// a reply that shows it.
+/// Checks the registers after a reply with `count` registers from `address` on. Skips a reply without the extended block,
+/// because the arm computes the block only for a reply that shows it.
 pub fn check_reply(address: u8, count: u8, registers: &RegisterFile) {
     let end = u16::from(address) + u16::from(count);
     if address > MEASURED_JOINTS.address || end <= FINE_TARGET.address.into() {
@@ -28,7 +28,7 @@ pub fn check_reply(address: u8, count: u8, registers: &RegisterFile) {
     }
 }
 
-/// Both views show the same angle. A half is rounded before it is shown in hundredths.
+/// Checks that both views show the same angle. Each view is rounded by itself, so they differ by up to half a degree.
 fn assert_same_angle(joint: Joint, hundredths: u16, degrees: u8) {
     assert!(hundredths <= MAX_HUNDREDTHS, "{joint:?}: {hundredths} hundredths");
     let difference = hundredths.abs_diff(u16::from(degrees) * 100);

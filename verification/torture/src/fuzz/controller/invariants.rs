@@ -16,8 +16,8 @@ use super::extended_block;
 use super::scripted_replies::ServoCommand;
 use crate::linkage_goals::LinkageGoals;
 
-/// Counts of the largest step in a control cycle: per unit of speed (0.019 degrees) and for the motor (3.72 degrees), at
-/// 850 / 180 counts per degree.
+/// The largest step of a goal in a control cycle, in counts: per unit of the speed register (0.019 degrees), and at the
+/// motor's maximum (3.72 degrees). 850 counts are 180 degrees.
 const COUNTS_PER_SPEED: f64 = 0.019 * 850.0 / 180.0;
 const MAX_COUNTS: f64 = 3.72 * 850.0 / 180.0;
 const CYCLE_US: u64 = 10_000;
@@ -25,9 +25,9 @@ const VALVE_TIME_US: u64 = 500_000;
 
 #[derive(Clone, Copy, Default)]
 struct JointGoal {
-    /// The goal of the servo, its time, and the number of polls at that time; `None` while its torque is off.
+    /// The last goal, its time in microseconds, and the number of polls at that time; `None` while the torque is off.
     goal: Option<(u16, u64, u32)>,
-    /// The highest speed since then, in counts per cycle.
+    /// The highest speed limit since the last goal, in counts per cycle.
     max_speed: f64,
 }
 
@@ -39,7 +39,7 @@ pub struct InvariantChecker {
     calls: u32,
     joints: [JointGoal; 7],
     is_driven: [bool; 7],
-    /// The time since which the motor state is not servo.
+    /// The time since which the motor state is not servo, in microseconds.
     released_at: Option<u64>,
     valve_opened_at: Option<u64>,
     vacuum: Vacuum,
@@ -65,7 +65,7 @@ impl InvariantChecker {
         }
     }
 
-    /// Checks that a frame to the host is complete, and that its values are those of the registers.
+    /// Checks that a frame to the host is complete, and that its values match the registers.
     pub fn frame_to_host(&self, bytes: &[u8], registers: &RegisterFile) {
         let ParseOutcome::Complete(reply, length) = parse::<ToHost>(bytes) else {
             panic!("{bytes:?} is not a frame")
@@ -81,7 +81,7 @@ impl InvariantChecker {
         extended_block::check_reply(reply.address, reply.count, registers);
     }
 
-    /// Checks a command to the servos. `positions` are those of their last replies, in counts.
+    /// Checks a command to the servos. `positions` are the positions in the servos' last replies, in counts.
     pub fn command_to_servos(
         &mut self,
         now_us: u64,
@@ -118,11 +118,11 @@ impl InvariantChecker {
         }
     }
 
-    /// The goals of joints 2 and 3 keep the linkage, if it limits them (D25).
+    /// Checks that the goals of joints 2 and 3 keep the linkage, while that limit is on (D25).
     fn linkage_goals(&mut self, goals: &[(u8, u16)], registers: &RegisterFile, positions: &[u16; 7]) {
         let [_, two, three, ..] = Joint::ALL;
         let offsets = [two, three].map(|joint| registers.offset(joint));
-        // A new goal at the joint's position: it engages where a hand left it.
+        // A new goal at the reported position means that the joint engages there.
         let engages = goals.iter().any(|&(id, counts)| {
             let index = usize::from(id);
             matches!(id, 1 | 2)
@@ -140,14 +140,15 @@ impl InvariantChecker {
         assert!(!is_on || check.is_ok(), "{check:?}");
     }
 
-    /// A goal is within reach of the last one, or at the joint's position.
+    /// Checks that the joint can reach a goal from the last one in the time between them, or that it is at the joint's position.
     fn goal_command(&mut self, now_us: u64, id: u8, counts: u16, position: u16, registers: &RegisterFile) {
         let Some(joint) = Joint::from_index(id) else { panic!("there is no servo {id}") };
         assert_eq!(registers.get(MISSING_SERVOS.address) & joint.bit(), 0, "{joint:?} is missing");
         let state = &mut self.joints[usize::from(id)];
         let calls = self.calls;
         let is_near = |(before, at, call): (u16, u64, u32)| {
-            // One late cycle is caught up, and one may just have ended. Each cycle needs a poll.
+            // Two more cycles: the controller may catch up with a late one, and one may just have ended. Each cycle needs
+            // a poll.
             let cycles = ((now_us - at) / CYCLE_US + 2).min((calls - call).into());
             f64::from(before.abs_diff(counts)) <= state.max_speed * cycles as f64 + 2.0
         };
@@ -186,7 +187,7 @@ impl InvariantChecker {
     /// Checks the state when the controller waits.
     pub fn after_wait(&mut self, now_us: u64, registers: &RegisterFile) {
         self.after_poll(registers);
-        // After a write in map 2.1, offsets have the encoding of that map.
+        // Offsets are not checked: after a write in map 2.1 they have the encoding of that map.
         let is_open = |row: &&Register| row.access == Access::ReadWrite && **row != OFFSET;
         for row in MAP.iter().filter(is_open) {
             for address in (row.address..).take(row.count.into()).step_by(row.range.width().into()) {
@@ -205,7 +206,7 @@ impl InvariantChecker {
         self.check_release(now_us, registers);
     }
 
-    /// Torque is switched off as soon as the bus is free.
+    /// Checks that torque is switched off as soon as the servo bus is free.
     fn check_release(&mut self, now_us: u64, registers: &RegisterFile) {
         if registers.get(MOTOR_STATE.address) == motor_state::SERVO {
             self.released_at = None;

@@ -2,13 +2,13 @@
 
 use motion_core::servo_bus::frame::{Decoder, Instruction, Reading, ServoFrameBuffer, register, status};
 
-/// The longest read from the position on.
+/// The largest number of registers in a read that begins at the position.
 const MOST_FROM_POSITION: u8 = 11;
 
-/// A decoded command. Servos count from 0.
+/// A decoded command. Servo numbers start at 0.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum ServoCommand {
-    /// A read of this many registers of a servo: up to 11 from its position on, more from its torque switch on.
+    /// A read: the servo and the number of registers. Up to 11 registers start at the position, more at the torque switch.
     Read(u8, u8),
     /// The torque code for each servo in the frame.
     Torque([Option<u8>; 7]),

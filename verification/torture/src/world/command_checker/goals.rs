@@ -1,5 +1,5 @@
-//! Goals are within reach of the last ones, end at the target and keep the linkage. After a silence, and without torque, they
-//! are where the joint stands (D10, D12, D25, D27, D29).
+//! Checks that goals are within reach of the last ones, end at the target and keep the linkage. After a silence, and without
+//! torque, a goal has to be at the joint's position (D10, D12, D25, D27, D29).
 
 use protocol_core::registers::Joint;
 use protocol_core::registers::map::{
@@ -36,7 +36,8 @@ impl CommandChecker {
         self.check_linkage(context)
     }
 
-    /// The goals of joints 2 and 3 keep the linkage, if it limits them (D25). A joint that gives way may leave it (D27).
+    /// Checks that the goals of joints 2 and 3 keep the linkage while that limit is on (D25). A joint that gives way may leave
+    /// it (D27).
     fn check_linkage(&mut self, context: &CommandContext<'_>) -> Check {
         let [_, two, three, ..] = Joint::ALL;
         let gives_way = |joint| context.bus.truth(joint).may_give_way(context.now);
@@ -57,7 +58,7 @@ impl CommandChecker {
         let before = self.ranges[joint].or(paused);
         let reached = before.and_then(|range| range.after(joint, goal, speed, context.now));
         let new = ReachableRange::at(joint, goal, speed, context.now);
-        // A joint without torque that engages anew where it is did not move there.
+        // A joint without torque engages anew at its position: its goal does not continue the last motion.
         let is_engaging = !self.is_on[joint] || self.replies.was_read_off(joint);
         let goes_on = reached.filter(|_| paused.is_none() && !is_engaging);
         if goes_on.is_none() {
@@ -79,8 +80,8 @@ impl CommandChecker {
         }
     }
 
-    /// A servo without torque gets no goal but where it stands. After an unanswered question its torque is read first
-    /// (D29).
+    /// Checks that a servo without torque gets a goal only at its position, and that its torque was read since the last
+    /// unanswered read (D29).
     fn check_doubt(&self, joint: Joint, goal: u16, context: &CommandContext<'_>) -> Check {
         if !context.bus.is_undisturbed(context.now) {
             return Ok(());
@@ -109,8 +110,8 @@ impl CommandChecker {
     }
 }
 
-/// The goal of a joint that has arrived is its target. A target that the host did not write is the measured position,
-/// rounded to degrees and limited to 0..=180.
+/// Checks that the goal of a joint that has arrived is its target. A target that the host did not write is the measured
+/// position, rounded to degrees and limited to 0..=180.
 fn check_arrival(joint: Joint, goal: u16, context: &CommandContext<'_>) -> Check {
     if context.registers.get(MOVING_JOINTS.address) & joint.bit() != 0 {
         return Ok(());

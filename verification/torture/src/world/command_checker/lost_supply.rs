@@ -1,4 +1,4 @@
-//! The arm finds its supply lost only when it is (D29).
+//! Checks that the arm reports a lost supply only after a loss (D29).
 
 use protocol_core::registers::Joint;
 use protocol_core::time::{Duration, Instant};
@@ -7,11 +7,11 @@ use super::CommandChecker;
 use crate::violation::{Check, ensure};
 use crate::world::disturbed_bus::{Availability, DisturbedBus};
 
-/// A servo that has responded for this long has shown its torque.
+/// The controller has read the torque of a servo that has responded for this long.
 const ANSWERS_AFTER: Duration = Duration::from_millis(3_000);
 
 impl CommandChecker {
-    /// The arm finds its supply lost only after its driven servos were silent, and while none answers with torque (D29).
+    /// Checks that the arm reports a lost supply only after a servo was silent, and while no servo answers with torque (D29).
     pub(crate) fn check_lost_supply(&self, now: Instant, bus: &DisturbedBus) -> Check {
         let responding_for = |joint: Joint| match bus.availability(joint) {
             Availability::Responding(since) => now - since,

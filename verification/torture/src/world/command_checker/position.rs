@@ -1,4 +1,4 @@
-//! A joint gets a goal or torque only where it stands, and only if its servo answers (D12).
+//! Checks that a joint gets a goal or torque only at its position, and only if its servo answers (D12).
 
 use protocol_core::registers::Joint;
 use protocol_core::registers::map::MISSING_SERVOS;
@@ -9,13 +9,13 @@ use crate::violation::{Check, ensure};
 
 /// The number of reads without a reply after which a servo is silent: three have failed (D12), one may be in progress.
 const MAX_UNANSWERED: u8 = 4;
-/// The controller reads a joint again before it gives torque later than this after a reading.
+/// The largest age of the reading for which the controller gives torque. It reads the joint again before it uses an older one.
 const FRESH_FOR: Duration = Duration::from_millis(20);
-/// Counts that a joint without torque may fall in that time, at 130 degrees/s.
+/// Counts that a joint without torque may fall during [`FRESH_FOR`], at 130 degrees/s.
 const MAX_FALL: u16 = 12;
 
 impl CommandChecker {
-    /// A silent servo receives only reads (D12).
+    /// Checks that a silent servo receives only reads (D12).
     pub(super) fn check_responding(&self, joint: Joint, what: &str, context: &CommandContext<'_>) -> Check {
         let is_flagged = context.registers.get(MISSING_SERVOS.address) & joint.bit() != 0;
         // On a disturbed bus the controller may decode a reply that this decoder misses.
@@ -27,8 +27,8 @@ impl CommandChecker {
         })
     }
 
-    /// A joint starts from its position, or from a near goal that it kept while its servo was lost or the controller
-    /// restarted (D12).
+    /// Checks that a joint starts from its position, or from a near goal that it kept while its servo was lost or the
+    /// controller restarted (D12).
     pub(super) fn check_position(
         &self,
         joint: Joint,
@@ -42,7 +42,7 @@ impl CommandChecker {
         let is_kept = self.kept_goals[joint].into_iter().chain(held).any(is_at);
         let degrees = if is_kept { 4 } else { 1 };
         let fall = if bus.has_torque(joint) { 0 } else { MAX_FALL };
-        // After its reading the joint may go on moving: the servo may execute a corrupted goal. A reply may be old.
+        // The joint may move after its reading, for example to a corrupted goal. The reading itself may be old.
         let speed = u64::from(bus.last_status(joint).speed);
         let moved = (bus.reply_age(joint).as_micros() * 1_757 + FRESH_FOR.as_micros() * speed) / 1_000_000;
         let error = bus.position_tolerance(joint, context.now);
@@ -56,7 +56,7 @@ impl CommandChecker {
     }
 }
 
-/// Counts of a degree, with the rounding of a reading.
+/// The number of counts in a degree, rounded up.
 pub(super) fn degree(joint: Joint) -> u16 {
     if joint.number() < 5 { 5 } else { 4 }
 }

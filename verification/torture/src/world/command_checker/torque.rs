@@ -1,5 +1,5 @@
-//! Torque is switched on only where a joint stands, with the goal that its servo holds, and off only where there is none (D12,
-//! D13, D28).
+//! Checks that torque is switched on only at the position of a joint, with the goal that its servo holds, and off only if
+//! the servo has no torque (D12, D13, D28).
 
 use motion_core::servo_bus::Torque;
 use protocol_core::registers::Joint;
@@ -10,11 +10,11 @@ use super::position::degree;
 use super::{CommandChecker, CommandContext, invalid_frame};
 use crate::violation::{Check, Violation, ensure};
 
-/// After this time with torque, the controller has read that a servo has it.
+/// After this time with torque, the controller has read that the torque of a servo is on.
 const HELD_FOR: Duration = Duration::from_millis(1_000);
 
 impl CommandChecker {
-    /// Torque switches are set to the motor state in register 29 (D13).
+    /// Checks that torque switches are set to the motor state in register 29 (D13).
     pub(super) fn check_torque_switches(&mut self, items: &[u8], context: &CommandContext<'_>) -> Check {
         let state = context.registers.get(MOTOR_STATE.address);
         let torque = match state {
@@ -40,7 +40,7 @@ impl CommandChecker {
         Ok(())
     }
 
-    /// Only a servo that holds no torque is switched off in state servo (D28).
+    /// Checks that only a servo without torque is switched off in state servo (D28).
     fn check_torque_off(&mut self, joint: Joint, context: &CommandContext<'_>) -> Check {
         let bus = context.bus;
         ensure(!context.is_known(joint) || !bus.has_torque(joint), || {
@@ -51,7 +51,7 @@ impl CommandChecker {
         Ok(())
     }
 
-    /// Torque is switched on where a joint stands, and refreshed where it was read on.
+    /// Checks that torque is switched on only at the position of a joint, and refreshed only after it was read as on.
     fn check_torque_on(&mut self, joint: Joint, context: &CommandContext<'_>) -> Check {
         let number = joint.number();
         self.check_responding(joint, "is given torque", context)?;
@@ -68,7 +68,7 @@ impl CommandChecker {
                 format!("the torque of joint {number} is refreshed, but was not read on since the last time")
             });
         }
-        // The goal may be missing in the last frame of goals. What counts is that its servo has it.
+        // The last frame of goals may have none for this joint. The servo holds its last goal.
         let range = self.ranges[joint]
             .or(self.paused[joint])
             .ok_or_else(|| Violation(format!("joint {number} is given torque without a goal")))?;
@@ -88,12 +88,13 @@ impl CommandChecker {
         Ok(())
     }
 
-    /// True if the servo has torque already, and this goal. It may still be on its way there from an older one.
+    /// True if the servo already has torque and this goal, so that the command changes nothing. The servo may still be on its
+    /// way to the goal.
     fn is_effectless(joint: Joint, goal: u16, context: &CommandContext<'_>) -> bool {
         context.bus.has_torque(joint) && context.bus.servo_goal(joint).abs_diff(goal) <= 1
     }
 
-    /// A servo without torque holds the goal that was sent to it, so that it does not go to an older one with its torque.
+    /// Checks that a servo without torque holds the last goal that was sent to it. With torque it would go to an older one.
     fn check_servo_goal(&self, joint: Joint, goal: u16, context: &CommandContext<'_>) -> Check {
         let bus = context.bus;
         let held = bus.servo_goal(joint);
@@ -102,11 +103,11 @@ impl CommandChecker {
         })
     }
 
-    /// A joint that let go engages when its alarm has been gone for a while (D28). If it let go soon after it had got torque, the
-    /// controller may take its order for lost.
+    /// Checks that a joint that was let go engages only when its alarm has been gone for a while (D28). If it was let go soon
+    /// after it was given torque, the controller may assume that the torque command was lost.
     fn check_alarm_is_over(&self, joint: Joint, context: &CommandContext<'_>) -> Check {
         let truth = context.bus.truth(joint);
-        // A joint that nothing moved counts as held, and is driven on after a silence.
+        // A joint that has not turned since it lost its torque counts as held, and is driven on after a silence.
         let was_held =
             self.was_silent(joint) && truth.lost_at().is_some_and(|at| !truth.has_turned_since(at));
         ensure(truth.is_calm(context.now) || was_held || !self.was_let_go(joint, context), || {
@@ -114,8 +115,8 @@ impl CommandChecker {
         })
     }
 
-    /// A joint that was let go engages at most three times in a minute, unless register 29 is written (D28). That it waits for the host
-    /// longer than the minute, a test of motion-core checks.
+    /// Checks that a joint that was let go engages at most three times in a minute, unless register 29 is written (D28). A test
+    /// of motion-core checks that it then waits for the host, also after the minute.
     fn check_attempts(&mut self, joint: Joint, context: &CommandContext<'_>) -> Check {
         // The servo of a joint that fell silent may have restarted unnoticed. Such a joint is not let go.
         if self.was_silent(joint) || !self.was_let_go(joint, context) {
@@ -126,7 +127,7 @@ impl CommandChecker {
         })
     }
 
-    /// True if its servo fell silent since it was last given torque.
+    /// True if the servo of the joint fell silent since the joint was last given torque.
     fn was_silent(&self, joint: Joint) -> bool {
         self.servo_lost_at[joint] > self.engaged_at[joint]
     }
@@ -137,15 +138,15 @@ impl CommandChecker {
         times.is_some_and(|(lost, engaged)| lost > engaged + HELD_FOR) && context.is_known(joint)
     }
 
-    /// The target of a joint that lost its torque since it was last given torque is where it gets torque again, unless the
-    /// host wrote one since then. A joint may lose its torque more than once before it is given torque: a hot servo holds by
-    /// itself, and restarts.
+    /// Checks that a joint that lost its torque gets torque again at its target, unless the host wrote the target since the
+    /// loss. A joint may lose its torque twice before the controller gives it torque: a hot servo may hold its goal again by
+    /// itself, and then restart.
     fn check_held_target(&self, joint: Joint, goal: u16, context: &CommandContext<'_>) -> Check {
         let bus = context.bus;
         let Some((lost_at, engaged_at)) = bus.truth(joint).lost_at().zip(self.engaged_at[joint]) else {
             return Ok(());
         };
-        // Before it lost its torque, the servo may have been silent: a target that came then is taken, too (D12).
+        // The servo may have been silent before it lost its torque. A target written during the silence counts, too (D12).
         let silent_at = self.servo_lost_at[joint].filter(|at| *at > engaged_at);
         let since = silent_at.map_or(lost_at, |at| at.min(lost_at));
         let since = if self.is_written_for_later[joint] { engaged_at } else { since };
@@ -204,7 +205,7 @@ mod tests {
     fn torque_for_a_servo_that_has_it_and_this_goal_changes_nothing() {
         let mut arm = ScriptedArm::with_engaged(JOINT);
         let goal = arm.bus.position(JOINT);
-        // Its servo was silent, and something has turned it.
+        // The servo was silent, and something has turned the joint.
         arm.checker.servo_lost(arm.now, JOINT);
         arm.ask(JOINT).unwrap();
         arm.goal(JOINT, goal).unwrap();

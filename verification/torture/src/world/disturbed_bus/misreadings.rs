@@ -20,7 +20,7 @@ pub(super) struct Misreadings {
 }
 
 impl Misreadings {
-    /// A reply of this servo has an undetected error.
+    /// Records an undetected error in a reply of this servo.
     pub(super) fn undetected_error(&mut self, now: Instant, joint: Joint) {
         if self.was_error(joint, now) {
             self.used_until[joint] = now + MISREAD_TIME;
@@ -37,7 +37,7 @@ impl Misreadings {
         now < self.used_until[joint]
     }
 
-    /// When the controller used a false reading of this joint for the last time.
+    /// The time until which the controller may use a false reading of this joint.
     pub(super) fn may_be_used_until(&self, joint: Joint) -> Instant {
         self.used_until[joint]
     }

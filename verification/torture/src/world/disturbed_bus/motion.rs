@@ -1,4 +1,4 @@
-//! Checks what the joints do: that none moves by itself (D12) or pushes too hard (D27).
+//! Checks that no joint moves by itself (D12) or pushes too hard (D27).
 
 use protocol_core::registers::Joint;
 use protocol_core::time::{Duration, Instant};
@@ -9,7 +9,7 @@ use crate::violation::Check;
 use crate::world::motion_checker::Exemption;
 use crate::world::push_rule::Push;
 
-/// Half of a servo timeout with which silent servos do not delay the readings of the others.
+/// Half of the longest servo timeout with which silent servos do not delay the readings of the others.
 const SHORT: Duration = Duration::from_micros(2_500);
 
 impl DisturbedBus {
@@ -19,7 +19,7 @@ impl DisturbedBus {
     }
 
     /// Checks that no joint has moved by itself. `is_guarded` tells that the controller runs and protects the servos.
-    /// `limits` are those of the pushes in 0.1 %; `None` without protection.
+    /// `limits` are the push limits in 0.1 %; `None` without protection.
     pub(crate) fn check_motion(
         &mut self,
         now: Instant,
@@ -55,7 +55,7 @@ impl DisturbedBus {
         self.motion_checker.check(now, is_servo, is_guarded && is_undisturbed, &self.plant)
     }
 
-    /// Takes the truth about a joint.
+    /// Updates the truth about a joint from the plant and its last status.
     fn observe(&mut self, now: Instant, joint: Joint, may_miss_orders: bool) {
         let truth = &mut self.truths[joint];
         truth.observe(now, self.plant.torque(joint), may_miss_orders);
@@ -63,14 +63,14 @@ impl DisturbedBus {
         truth.reports(now, self.last_status[joint]);
     }
 
-    /// True if a controller that is not disturbed reads the servos that respond often enough to limit their pushes. Each silent
-    /// servo costs a timeout: with long ones the others are read a few times a second.
+    /// True if an undisturbed controller reads the responding servos often enough to limit their pushes. Each silent servo
+    /// costs a timeout: with long timeouts, the other servos are read only a few times a second.
     fn are_read_often(&self, now: Instant) -> bool {
         self.timely_limit <= SHORT
             || Joint::ALL.iter().all(|joint| self.availability(*joint).has_responded(now))
     }
 
-    /// Checks the push of a joint. `limit` is what the controller keeps, if it can.
+    /// Checks the push of a joint. `limit` is `None` if the controller cannot limit the push now.
     fn check_push(&mut self, now: Instant, joint: Joint, permille: i16, limit: Option<i16>) -> Check {
         let push = Push {
             permille,

@@ -1,4 +1,4 @@
-//! What acts on the servos beside the frames: faults, obstacles, hands, payloads, alarms and the supply.
+//! Influences on the servos other than frames: faults, obstacles, hands, payloads, alarms and the supply.
 
 use arm_sim::plant::{SupplyFault, Thing, Wall};
 use arm_sim::servo::{ServoFault, Trip};
@@ -26,7 +26,7 @@ impl DisturbedBus {
             self.motion_checker.exempt(now, joint, Exemption::PowerLoss);
         }
         if fault == Some(ServoFault::Stuck) {
-            // It may stop where it overshot its goal.
+            // The joint may get stuck where it overshot its goal.
             self.motion_checker.exempt(now, joint, Exemption::Hand);
         }
         self.since[joint] = if was_missing { now + BOOT_TIME } else { now };
@@ -91,7 +91,7 @@ impl DisturbedBus {
         self.since = PerJoint::all(now);
     }
 
-    /// The supply of the servos is back.
+    /// Restores the supply of all servos.
     pub(crate) fn end_stop(&mut self, now: Instant) {
         self.plant.bytes(now, &[]);
         self.plant.set_supply_fault(None);

@@ -8,7 +8,7 @@ use std::collections::VecDeque;
 use motion_core::servo_bus::frame::{Decoder, Reading};
 use protocol_core::registers::Joint;
 
-/// The kept replies: those of the longest delay on the wire, 40 ms, and as many again.
+/// The number of kept replies: twice as many as the servos send during the longest delay on the wire, 40 ms.
 const MAX_KEPT: usize = 64;
 
 /// A reply: its joint and its parameters.
@@ -28,7 +28,7 @@ impl ReplyComparison {
         Self { sent: Decoder::new(), received: Decoder::new(), sent_replies: VecDeque::new() }
     }
 
-    /// The controller asks a servo. It forgets the bytes from before.
+    /// The controller asks a servo, and forgets the bytes that it received before.
     pub(super) fn asked(&mut self) {
         self.sent.clear();
         self.received.clear();

@@ -11,7 +11,7 @@ use crate::world::status_reply::StatusFields;
 
 /// The controller repeats a lost torque frame within this time.
 const REPEAT_TIME: Duration = Duration::from_millis(600);
-/// A servo that has responded for this long is known to the controller.
+/// The controller knows the state of a servo that has responded for this long.
 const SETTLED: Duration = Duration::from_millis(3_000);
 
 impl DisturbedBus {
@@ -33,7 +33,7 @@ impl DisturbedBus {
         self.last_status[joint]
     }
 
-    /// What the servo of a joint did.
+    /// The history of the torque, alarms and pushes of a joint.
     pub(crate) fn truth(&self, joint: Joint) -> &JointTruth {
         &self.truths[joint]
     }
@@ -56,7 +56,7 @@ impl DisturbedBus {
         Joint::ALL.iter().all(holds)
     }
 
-    /// True if the servo may be let go, as the controller sees it (D28), perhaps because of a false reading.
+    /// True if the controller may take the joint for let go (D28), perhaps because of a false reading.
     pub(crate) fn may_be_let_go(&self, joint: Joint, now: Instant) -> bool {
         self.truths[joint].may_be_let_go(now) || self.may_be_misread(joint, now)
     }

@@ -2,8 +2,8 @@
 
 use protocol_core::time::Instant;
 
-/// The accepted distance of a joint from its range, in millidegrees, without load and speed. A goal is a multiple of up
-/// to 0.29 degrees, and the angle is measured after the goal is computed.
+/// The accepted distance of a joint from its range, in millidegrees, without load and speed. A goal is a multiple of a count,
+/// which is up to 0.29 degrees, and the angle is measured after the goal is computed.
 const TOLERANCE: i32 = 450;
 /// A servo with this load, in 0.1 %, drives its joint back.
 const DRIVES_BACK: i16 = 100;
@@ -61,18 +61,18 @@ impl AngleRange {
 /// The checked state of a joint.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct JointBounds {
-    /// Why it may move without a goal, and the earliest end of that.
+    /// Why the joint may move without a goal, and the earliest end of the exemption.
     pub(super) exemption: Option<(Exemption, Instant)>,
     /// The last goal that its servo has received since it has had power.
     pub(super) goal: Option<i32>,
-    /// Its servo had no power, and has received no goal since then.
+    /// True if its servo had no power, and has received no goal since then.
     pub(super) awaits_goal: bool,
     /// The goals of the present period of 100 ms, and of the period before.
     pub(super) goals: [AngleRange; 2],
     pub(super) range: AngleRange,
     /// Until then the joint may run past its goals if its servo drives it back.
     pub(super) overruns_until: Instant,
-    /// Its servo had torque at the last check.
+    /// True if its servo had torque at the last check.
     pub(super) had_torque: bool,
     /// How far it was outside its range at the last check.
     pub(super) excess: i32,

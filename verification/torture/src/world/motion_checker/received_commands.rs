@@ -9,7 +9,7 @@ use protocol_core::registers::Joint;
 /// The number of sent frames that are kept for comparison. A servo may decode a frame late, after noise.
 const MAX_SENT_FRAMES: usize = 8;
 
-/// Decodes what reaches the servos.
+/// Decodes the bytes that reach the servos.
 #[derive(Debug)]
 pub(super) struct ReceivedCommands {
     decoder: Decoder,
@@ -22,7 +22,7 @@ impl ReceivedCommands {
         Self { decoder: Decoder::new(), sent: VecDeque::new() }
     }
 
-    /// All servos lost their power, and the bytes of an incomplete frame.
+    /// Forgets the bytes of an incomplete frame, because all servos lost their power.
     pub(super) fn clear(&mut self) {
         self.decoder.clear();
     }

@@ -7,7 +7,7 @@ use super::super::{extended_model, map21_model};
 use super::{OwnTarget, RegisterModel};
 use crate::violation::{Check, ensure};
 
-/// The first and last addresses of the registers whose values follow from requests alone.
+/// The ranges of registers whose values follow only from requests: first and last address.
 const MODELLED: &[(u8, u8)] = &[
     (0, 45),
     (53, 53),
@@ -48,7 +48,7 @@ impl RegisterModel {
         ensure(loads.iter().all(|load| (3..=253).contains(load)), || format!("loads {loads:?}"))
     }
 
-    /// True if the arm may have these registers.
+    /// True if the registers of the arm agree with the model.
     pub(crate) fn fits(&self, registers: &RegisterFile) -> bool {
         self.compare(registers).is_ok() && self.clone().compare_targets(registers).is_ok()
     }
@@ -69,8 +69,8 @@ impl RegisterModel {
         })
     }
 
-    /// A target that differs from the model is the measured position (D12, D13), the goal that a servo held when the
-    /// controller started (D12), or where the joint gave way (D27). The model takes it over.
+    /// Checks that a target that differs from the model is the measured position (D12, D13), the goal that a servo held when
+    /// the controller started (D12), or one that the arm may have set (D27, D28). The model takes it over.
     pub(crate) fn compare_targets(&mut self, registers: &RegisterFile) -> Check {
         for joint in Joint::ALL {
             let (at, found) = (TARGET_POSITION.of(joint), registers.get(TARGET_POSITION.of(joint)));

@@ -1,4 +1,4 @@
-//! The verdict of the limits on a write (D25), and how to find the one that the model cannot know.
+//! The verdict of the limits on a write (D25). A verdict that the model cannot know follows from the arm's registers.
 
 use protocol_core::registers::map::{MOTOR_STATE, limit, motor_state};
 use protocol_core::registers::{Joint, RegisterFile};
@@ -9,20 +9,20 @@ use super::super::limit_verdict::{self, CLAW, LINKAGE, LimitVerdict};
 use super::super::written_targets::WrittenTargets;
 use super::RegisterModel;
 
-/// Requests of one poll have at most this many combinations of unknown verdicts that are tried.
+/// The largest number of combinations of unknown verdicts that are tried for the requests of one poll.
 const MAX_TRIALS: usize = 1_024;
 
 /// The verdicts of the arm on the requests of a poll, as far as its registers tell them.
 #[derive(Debug, Default)]
 pub(crate) struct FoundVerdicts {
-    /// For each request: the register because of which it was refused.
+    /// For each request, the register that the refusal names; `None` if the limits allowed the request.
     pub(crate) outcomes: Vec<Option<u8>>,
     /// The joints whose targets remain unknown, bit n-1 for joint n.
     pub(crate) unclear: u8,
 }
 
 impl RegisterModel {
-    /// The possible outcomes of a write: the register because of which it is refused.
+    /// The possible outcomes of a write: the register that a refusal names; `None` if the limits allow the write.
     pub(crate) fn limit_outcomes(&self, write: &WrittenTargets<'_>) -> Vec<Option<u8>> {
         let before = self.get(LIMITS);
         let after = write.value_at(LIMITS).unwrap_or(before);
@@ -39,7 +39,7 @@ impl RegisterModel {
             let Some(at) = at.filter(|_| after & bit != 0) else { return LimitVerdict::Allowed };
             match is_kept {
                 Some(false) => LimitVerdict::Refused(at),
-                // A set-point may be against the limit.
+                // A set-point may break the limit.
                 Some(true) if is_switched_on && self.is_servo() => LimitVerdict::Unknown(at),
                 Some(true) => LimitVerdict::Allowed,
                 None => LimitVerdict::Unknown(at),
@@ -48,8 +48,8 @@ impl RegisterModel {
         limit_verdict::outcomes([of(limit::LINKAGE, &[two, three], linkage), of(limit::CLAW, &[seven], claw)])
     }
 
-    /// Finds which of the requests of a poll the arm refused where the model cannot know it: tries all combinations, and
-    /// keeps those that lead to the arm's registers.
+    /// Finds which of the requests of a poll the arm refused against a limit, where the model cannot know it. Tries all
+    /// combinations, and keeps those that lead to the arm's registers.
     pub(crate) fn find_verdicts(
         &self,
         requests: &[&HostRequest],

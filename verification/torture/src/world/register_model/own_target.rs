@@ -1,19 +1,20 @@
 //! The targets that the arm may set itself (D27, D28).
 
-/// What the arm may have made of a target, beside the measured position.
+/// The values to which the arm may have set a target, beside the measured position.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum OwnTarget {
     /// The measured position alone.
     Measured,
-    /// The joint may be let go: its target follows the measured position, and a point of a stream is not taken (D28). This
-    /// was the target before.
+    /// The joint may be let go: its target follows the measured position, and a point of a stream is not taken (D28). The
+    /// value is the target before.
     Before(u8),
-    /// The joint may have given way to an obstacle: its set-point between these degrees (D27), or the target before.
+    /// The joint may have given way to an obstacle: the target is its set-point, between `low` and `high` degrees (D27), or
+    /// still the target before.
     GaveWay { low: u8, high: u8, before: u8 },
 }
 
 impl OwnTarget {
-    /// True if points of a stream may not be taken: a joint that gives way may also be let go.
+    /// True if the arm may ignore points of a stream, because the joint is let go: a joint that gives way may be, too.
     pub(crate) const fn is_without_streams(self) -> bool {
         !matches!(self, Self::Measured)
     }

@@ -28,7 +28,7 @@ impl RegisterModel {
         self.has_host_target[joint] = false;
     }
 
-    /// In the servo state, measured positions become the targets (D13).
+    /// On entry into the servo state, measured positions become the targets (D13).
     pub(super) fn state_changed(&mut self, was_servo: bool) {
         if self.is_servo() != was_servo {
             self.has_host_target = PerJoint::all(false);
@@ -56,7 +56,7 @@ impl RegisterModel {
         self.targets[joint].filter(|_| self.has_host_target[joint])
     }
 
-    /// Where the servo of a joint is at the target in its register, in counts.
+    /// The target of a joint in counts: with its fraction if the host's target is in force, otherwise from the register.
     pub(crate) fn target_counts(&self, joint: Joint, registers: &RegisterFile) -> u16 {
         let shown = MicroDegrees::from_degrees(registers.get(TARGET_POSITION.of(joint)));
         counts_from_angle(joint, self.host_target(joint).unwrap_or(shown), self.offset(joint))

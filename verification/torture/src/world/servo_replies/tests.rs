@@ -29,7 +29,7 @@ fn has(replies: &mut ServoReplies, millis: u64, torque: Torque) {
     replies.received(at_ms(millis + 1), &answer);
 }
 
-/// The servo is asked, and answers where it stands, in counts.
+/// The servo is asked, and answers with this position in counts.
 fn stands(replies: &mut ServoReplies, millis: u64, counts: u16) {
     replies.asked(at_ms(millis), JOINT, 8, true);
     let [high, low] = counts.to_be_bytes();

@@ -8,7 +8,7 @@ use crate::world::disturbed_bus::{Availability, DisturbedBus};
 use crate::world::register_model::RegisterModel;
 use crate::world::watchdog_model::WatchdogModel;
 
-/// A joint whose last questions were not answered is late by this much.
+/// A joint may be late for this long after it got no goal, for example because its servo left reads unanswered.
 const PAUSE: Duration = Duration::from_millis(1_000);
 /// A joint that is driven gets a goal in each control cycle, or after each timeout on a bus with long ones.
 const GOAL_PERIOD: Duration = Duration::from_millis(100);
@@ -24,9 +24,9 @@ pub(crate) struct StatusContext<'a> {
 }
 
 impl StatusContext<'_> {
-    /// True if a joint need not go on with its move: it gives way, it is let go, some questions are not answered, or it is not
-    /// known whether the supply was lost. On a disturbed bus a joint may get no goals; if it is the only driven one, no frame
-    /// of goals shows that it pauses.
+    /// True if a joint need not continue its move: it gives way, it is let go, some reads are not answered, or the controller
+    /// does not know whether the supply was lost. On a disturbed bus a joint may get no goals; if it is the only driven one, no
+    /// frame of goals shows that it pauses.
     pub(super) fn may_be_late(&self, joint: Joint) -> bool {
         self.bus.truth(joint).may_give_way(self.now)
             || self.bus.may_be_let_go(joint, self.now)

@@ -1,4 +1,4 @@
-//! The status of one joint: missing, moving, let go, with torque, and where.
+//! Checks the status of one joint: missing, moving, let go, its torque and its position.
 
 use motion_core::calibration::angle_from_counts;
 use motion_core::servo_bus::frame::error;
@@ -15,7 +15,7 @@ use crate::world::extended_model;
 use crate::world::joint_truth::COOL;
 use crate::world::protection_model::PROTECTION;
 
-/// A position that was not checked for longer may have changed meanwhile: two checks.
+/// The joint may have moved away and back if its position was not checked for longer than this: two check periods.
 const UNCHECKED_TIME: Duration = Duration::from_millis(500);
 /// Torque is off this long after a change to another motor state than servo.
 const RELEASE_TIME: Duration = Duration::from_millis(300);
@@ -43,7 +43,7 @@ impl StatusChecker {
         let may_wait =
             context.model.get(LIMITS.address) & limit::LINKAGE != 0 && matches!(joint.number(), 2 | 3);
         if may_wait {
-            // It has its full time once the limit is off.
+            // The joint has its full time once the limit is off.
             self.settled_by[joint] = self.settled_by[joint].max(now + LONGEST_MOVE);
         }
         if context.may_be_late(joint) {
@@ -77,7 +77,7 @@ impl StatusChecker {
         Ok(())
     }
 
-    /// The position register of a joint at rest holds its position.
+    /// Checks that the position register of a joint at rest holds its position.
     fn check_position(&mut self, joint: Joint, context: &StatusContext<'_>) -> Check {
         let position = context.bus.position(joint);
         let (last, since) = self.last_moves[joint];
@@ -89,7 +89,7 @@ impl StatusChecker {
         if may_have_moved {
             self.last_moves[joint] = (position, context.now);
         }
-        // So it may after a write.
+        // It may also move after a write.
         if may_have_moved || self.settled_time(context.now, since.max(self.motion_at)) < DETECTION_TIME {
             return Ok(());
         }
@@ -100,9 +100,9 @@ impl StatusChecker {
         })
     }
 
-    /// A joint that is let go gets torque-off, which ends a latched overload (D28).
+    /// Checks that a joint that is let go gets torque-off, which ends a latched overload (D28).
     fn check_latch(&mut self, joint: Joint, context: &StatusContext<'_>) -> Check {
-        // Register 196 is as old as its last read. A joint that gets no goals at all is let go.
+        // Register 196 is as old as its last read, so a joint that gets no goals counts as let go.
         let is_let_go = context.now - context.command_checker.goal_at[joint] > CHECK_PERIOD;
         let is_due = is_let_go
             && context.model.is_servo()
@@ -116,7 +116,7 @@ impl StatusChecker {
         })
     }
 
-    /// A servo that responds has torque in motor state servo.
+    /// Checks that a servo that responds has torque in motor state servo.
     fn check_torque(&self, joint: Joint, context: &StatusContext<'_>) -> Check {
         let is_due =
             context.model.is_servo() && self.settled_time(context.now, self.state_at) > DETECTION_TIME;

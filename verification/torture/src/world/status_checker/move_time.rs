@@ -12,8 +12,8 @@ use crate::world::register_model::RegisterModel;
 const MOVE_MARGIN: Duration = Duration::from_millis(1_000);
 /// A point of a stream is reached after two periods and a cycle (D23), of the longest period.
 const MAX_STREAM_TIME: Duration = Duration::from_millis(2_020);
-/// More than any way of a set-point, in counts: from one end of a servo's range of 1,023 counts to a target beyond its other
-/// end. Joint 7 ends at 68 degrees with the offset -16, and takes targets up to 180 degrees.
+/// More than any move of a set-point, in counts: from one end of a servo's range of 1,023 counts to a target beyond its other
+/// end. The range of joint 7 ends at 68 degrees with the offset -16, and its targets go up to 180 degrees.
 pub(super) const WHOLE_RANGE: u16 = 1_450;
 /// The largest value of a time register.
 const MAX_TIME_UNITS: u8 = {
@@ -42,7 +42,7 @@ fn move_time(joint: Joint, distance: u16, registers: &RegisterFile) -> Duration 
     }
 }
 
-/// When a joint has to be at rest that has to move by this distance in counts from now on.
+/// The time by which a joint that has to move by this distance, in counts, has to be at rest.
 pub(super) fn rest_by(
     now: Instant,
     joint: Joint,
