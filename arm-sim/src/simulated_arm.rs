@@ -170,6 +170,19 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
         self.controller.baud()
     }
 
+    /// Whether bytes on the host line take the time that the baud rate requires. A change drops the bytes on the line.
+    pub(crate) fn set_paced(&mut self, is_paced: bool) {
+        if self.config.is_paced != is_paced {
+            self.config.is_paced = is_paced;
+            self.clear_host_line();
+        }
+    }
+
+    /// As [`Self::set_paced`] says.
+    pub(crate) const fn is_paced(&self) -> bool {
+        self.config.is_paced
+    }
+
     fn paced_baud(&self) -> Option<u32> {
         self.config.is_paced.then(|| self.controller.baud())
     }

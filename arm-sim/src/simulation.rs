@@ -125,6 +125,17 @@ impl<C: ArmController> Simulation<C> {
         self.now
     }
 
+    /// Whether bytes on the host line take the time that the baud rate requires.
+    #[must_use]
+    pub const fn is_paced(&self) -> bool {
+        self.arm.is_paced()
+    }
+
+    /// Sets [`Self::is_paced`]. A change drops the bytes on the line.
+    pub fn set_paced(&mut self, is_paced: bool) {
+        self.arm.set_paced(is_paced);
+    }
+
     /// The host starts to send these bytes now.
     pub fn send(&mut self, bytes: &[u8]) {
         self.to_send.extend(bytes);

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import time
+from pathlib import Path
 
 import gymnasium
 import numpy as np
@@ -111,6 +112,11 @@ def main() -> None:
     parser.add_argument("--disturbed", action="store_true", help="with loads, delays and faults")
     parser.add_argument("--save", default="reach_policy.npy")
     options = parser.parse_args()
+    if options.generations < 1:
+        parser.error("--generations: use 1 or more")
+    folder = Path(options.save).parent
+    if not folder.is_dir():
+        parser.error(f"--save: there is no folder {folder}")
     envs = environments(2 * PAIRS, disturbed=options.disturbed)
     evolution = Evolution(options.seed)
     start = time.perf_counter()

@@ -9,6 +9,7 @@ One thread of each arm waits for its calls, so that they run in order. A cancell
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from collections.abc import AsyncIterable, Awaitable, Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any, Literal, SupportsIndex, TypeAlias, TypeVar, overload
@@ -203,7 +204,13 @@ class Stream:
         self.sync = stream
 
     async def __aenter__(self) -> Stream:
-        await self._arm._call(self.sync.__enter__)
+        try:
+            await self._arm._call(self.sync.__enter__)
+        except asyncio.CancelledError as cancelled:
+            # It may have been opened before the cancellation reached the thread.
+            with contextlib.suppress(sevenbot.Closed):
+                await asyncio.to_thread(self.sync.__exit__, type(cancelled), cancelled, None)
+            raise
         return self
 
     async def __aexit__(self, *exception: Any) -> None:

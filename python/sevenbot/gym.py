@@ -140,6 +140,16 @@ class _Arms:
         return np.concatenate(parts, axis=1, dtype=np.float32)
 
 
+def _checked(name: str, goals: Any, shape: tuple[int, ...]) -> Floats:
+    try:
+        numbers: Floats = np.asarray(goals, np.float32)
+    except (TypeError, ValueError) as error:
+        raise InvalidValue(f"{name}: {error}: use numbers of the shape {shape}, in millimetres") from error
+    if numbers.shape != shape or not np.isfinite(numbers).all():
+        raise InvalidValue(f"{name}: use finite numbers of the shape {shape}, in millimetres; the shape here is {numbers.shape}")
+    return numbers
+
+
 def sample_goal(random: np.random.Generator) -> tuple[float, float, float]:
     """A point that the tip can reach, above the table."""
     while True:
@@ -167,7 +177,7 @@ class _ArmEnv(gymnasium.Env[Floats, Floats]):
         """Begins an episode. `options={"goal": (x, y, z)}` sets the goal, in millimetres."""
         super().reset(seed=seed)
         goal = (options or {}).get("goal")
-        goals = None if goal is None else np.array([goal], dtype=np.float32)
+        goals = None if goal is None else _checked("goal", goal, (3,)).reshape(1, 3)
         self._arms.reset(self.np_random, np.array([True]), goals)
         return self._arms.observations()[0], {}
 
@@ -235,7 +245,7 @@ class _ArmVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
         goals = (options or {}).get("goals")
         everything = np.ones(self.num_envs, dtype=np.bool_)
         self._ended[:] = False
-        self._begin(everything, None if goals is None else np.asarray(goals, np.float32))
+        self._begin(everything, None if goals is None else _checked("goals", goals, (self.num_envs, 3)))
         return self._arms.observations(), {}
 
     def _begin(self, mask: Flags, goals: Floats | None = None) -> None:

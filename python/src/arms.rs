@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use arm_sim::plant::HEAVIEST_LOAD_G;
 use numpy::{Element, PyArray1, PyReadonlyArray2};
+use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
 use pyo3::types::PySlice;
 use sevenbot::register_values::bytes;
@@ -23,8 +24,10 @@ use crate::worker::lock;
 
 /// Weights in the gripper.
 const GRAMS: std::ops::RangeInclusive<f64> = 0.0..=HEAVIEST_LOAD_G as f64;
-/// The most arms; each takes some 20 kilobytes.
+/// The most arms.
 const MOST_ARMS: i64 = 1_000_000;
+/// About the memory of an arm in bytes.
+const ARM_BYTES: usize = 20_000;
 
 /// Simulated arms that step together, for learning: `seen = arms.step(actions, 0.02)`, with an action of seven angles in degrees
 /// for each arm.
@@ -145,6 +148,11 @@ impl SimulatedArms {
         let threads = threads.and_then(NonZeroUsize::new).or_else(|| available_parallelism().ok());
         let threads = threads.unwrap_or(NonZeroUsize::MIN);
         let seeds = arrays::seeds(count, seed, seeds)?;
+        // The process would be aborted later.
+        let has_memory = Vec::<u8>::new().try_reserve_exact(count.saturating_mul(ARM_BYTES)).is_ok();
+        if !has_memory {
+            return Err(PyMemoryError::new_err(format!("there is not enough memory for {count} arms")));
+        }
         let arms = py.detach(|| library::SimulatedArms::new(&seeds, threads));
         Ok(Self { arms: Arc::new(Mutex::new(arms)), process: std::process::id(), count, threads })
     }

@@ -173,6 +173,7 @@ pub(crate) fn sample(
     period: Duration,
     watch: &mut Watch<'_>,
 ) -> Result<(Vec<f64>, Vec<[f64; 7]>), MoveError> {
+    arm.wait_until_settled()?;
     let mut check = MoveCheck::of_positions(arm);
     let row = arm.has_extended_block()?.then_some(FINE_POSITION);
     let start = arm.now();
@@ -183,7 +184,10 @@ pub(crate) fn sample(
         }
         sleep_until(arm, start + period.saturating_mul(number), watch)?;
         let angles = match row {
-            Some(row) => arm.read_span(Span::of(&row))?.words(&row).map(|word| f64::from(word) / 100.0),
+            Some(row) => {
+                let angle = |word| FineAngle::from_hundredths(word).map_or(f64::NAN, FineAngle::degrees);
+                arm.read_span(Span::of(&row))?.words(&row).map(angle)
+            }
             None => arm.positions()?.map(|angle| f64::from(angle.degrees())),
         };
         times.push(arm.now().saturating_duration_since(start).as_secs_f64());
@@ -230,7 +234,7 @@ fn record_into(
     watch: &mut Watch<'_>,
 ) -> Result<(), MoveError> {
     let RecordOptions { hz, is_guided, .. } = options;
-    let before = arm.joints()?;
+    let before = arm.wait_until_settled()?;
     if is_guided {
         arm.write_motion(MOTOR_STATE.address, &[motor_state::FORCELESS])?;
     }

@@ -34,7 +34,9 @@ impl From<&RegisterEntry> for Shown {
 /// Reads the registers of a name.
 pub(crate) fn get(py: Python<'_>, worker: &Worker, name: &str) -> PyResult<Shown> {
     let span = raised(py, parse(name))?;
-    let snapshot = raised(py, worker.read(py, move |arm| arm.read_span(span))?)?;
+    let read = move |arm: &mut sevenbot::Arm| check_served(arm, span).map(|()| arm.read_span(span));
+    let snapshot = worker.read(py, read)?.map_err(|address| not_served(py, address))?;
+    let snapshot = raised(py, snapshot)?;
     match entries(&snapshot).as_slice() {
         [only] => Ok(only.into()),
         several => Ok(Shown::Each(several.iter().map(Shown::from).collect())),
@@ -51,11 +53,8 @@ pub(crate) fn set(
 ) -> PyResult<()> {
     let span = raised(py, parse(name))?;
     let bytes = raised(py, bytes(span, values.as_slice()))?;
-    let unserved = worker.call(py, move |arm, _| span.addresses().find(|&address| !arm.serves(address)))?;
-    if let Some(address) = unserved {
-        let message = format!("this arm does not have {}", sevenbot::names::name_of_register(address));
-        return Err(error::<NotServed>(py, &message, &[]));
-    }
+    let served = worker.call(py, move |arm, _| check_served(arm, span))?;
+    served.map_err(|address| not_served(py, address))?;
     let written = worker.call(py, move |arm, _| {
         if span.addresses().any(|address| TARGET_POSITION.holds(address) || FINE_TARGET.holds(address)) {
             arm.end_abandoned_stream()?;
@@ -66,6 +65,16 @@ pub(crate) fn set(
         Ok(joints.filter(|joints| !joints.is_driven()).map_or(0, |joints| joints.missing()))
     })?;
     warn_of_silent(py, raised::<_, MoveError>(py, written)?)
+}
+
+/// Fails with the first register that the arm does not have.
+fn check_served(arm: &sevenbot::Arm, span: Span) -> Result<(), u8> {
+    span.addresses().find(|&address| !arm.serves(address)).map_or(Ok(()), Err)
+}
+
+fn not_served(py: Python<'_>, address: u8) -> PyErr {
+    let message = format!("this arm does not have {}", sevenbot::names::name_of_register(address));
+    error::<NotServed>(py, &message, &[])
 }
 
 /// Warns of servos that did not answer when the motors were switched off: it is unknown whether theirs are off.
@@ -132,7 +141,7 @@ impl Registers {
     }
 
     fn __contains__(&self, name: &str) -> bool {
-        parse(name).is_ok()
+        row(name).is_some_and(|row| self.names.contains(&name_of(row)))
     }
 
     fn __len__(&self) -> usize {
@@ -161,9 +170,9 @@ impl Registers {
     /// The value of a register, or `default` if there is none of this name.
     #[pyo3(signature = (name, default = None))]
     fn get(&self, py: Python<'_>, name: &str, default: Option<Py<PyAny>>) -> PyResult<Py<PyAny>> {
-        match (parse(name), default) {
-            (Ok(_), _) => Ok(get(py, &self.worker, name)?.into_pyobject(py)?.unbind()),
-            (Err(_), default) => Ok(default.unwrap_or_else(|| py.None())),
+        match (self.__contains__(name), default) {
+            (true, _) => Ok(get(py, &self.worker, name)?.into_pyobject(py)?.unbind()),
+            (false, default) => Ok(default.unwrap_or_else(|| py.None())),
         }
     }
 

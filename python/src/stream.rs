@@ -77,6 +77,15 @@ impl Stream {
     }
 }
 
+impl Drop for Stream {
+    fn drop(&mut self) {
+        // A forked process lacks the thread, which may have held a lock.
+        if !self.worker.is_forked() && self.slot.is_open() {
+            self.worker.abandon_stream();
+        }
+    }
+}
+
 impl PacedStream<'_> {
     /// Waits until the joints stand at their last points. After a failure of the whole arm they do not get there: then it returns
     /// only a failure that the program has not received yet.
@@ -165,6 +174,8 @@ impl Stream {
         self.check_open(py)?;
         let failed = exception.get_item(0).is_ok_and(|kind| !kind.is_none());
         let arrived = if failed {
+            // The way to a first action, which no call waits for, ends here.
+            self.worker.interrupt();
             Ok(Ok(()))
         } else {
             self.worker.stream_call(py, |stream, watch| stream.arrive(watch))

@@ -169,7 +169,22 @@ impl Worker {
             let is_other_open = self.is_open() && error.is_instance_of::<Closed>(py);
             if is_other_open { Closed::raise_other_stream(py) } else { error }
         })?;
-        finish(py, opened)
+        let is_interrupted = matches!(opened, (Ok(()), Some(_)));
+        let outcome = finish(py, opened);
+        if is_interrupted {
+            // The stream is open, and its caller leaves.
+            self.close_stream(py)?;
+        }
+        outcome
+    }
+
+    /// Closes a stream that its caller has forgotten, without a wait.
+    pub(crate) fn abandon_stream(&self) {
+        let close = Message::CloseStream(Arc::default(), sync_channel(1).0);
+        if let Some(port) = lock(&self.open).as_ref() {
+            // The thread may have ended.
+            let _ = port.messages.send(close);
+        }
     }
 
     /// As [`Self::call`], for the open stream.
@@ -221,7 +236,7 @@ impl Worker {
         &self.shows_progress
     }
 
-    fn is_forked(&self) -> bool {
+    pub(crate) fn is_forked(&self) -> bool {
         self.process != std::process::id()
     }
 
@@ -260,8 +275,7 @@ impl Drop for Worker {
 }
 
 fn finish(py: Python<'_>, (result, signal): (Result<(), StreamError>, Option<PyErr>)) -> PyResult<()> {
-    result.map_err(|error| error.raise(py))?;
-    signal.map_or(Ok(()), Err)
+    signal.map_or_else(|| result.map_err(|error| error.raise(py)), Err)
 }
 
 /// What a signal of Python does to a wait.

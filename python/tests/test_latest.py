@@ -255,11 +255,15 @@ def test_the_sender_of_an_arm_in_real_time_needs_no_call() -> None:
     with sevenbot.Arm("sim") as arm:
         with arm.stream(PERIOD, watchdog=1, approach=0.1) as stream:
             stream.latest(turned(91))
-            end = time.monotonic() + ENOUGH
+            end, acted = time.monotonic() + ENOUGH, 0
             while stream.counts.repeated < 10:
                 assert time.monotonic() < end, stream.counts
                 time.sleep(0.01)
-            while stream.counts.watchdog == 0:
+                if stream.counts.watchdog > acted:
+                    # The machine was too busy to send for a second.
+                    acted = stream.counts.watchdog
+                    stream.latest(turned(91))
+            while stream.counts.watchdog == acted:
                 assert time.monotonic() < end, stream.counts
                 time.sleep(0.01)
         assert arm.get("fine-target.1") == 9100

@@ -127,7 +127,7 @@ impl Track {
         let last = self.moments.last().map(|last| last.time);
         let (time, seconds) = (at.checked_sub(self.start), last.unwrap_or_default().as_secs_f64());
         let time = time.map(|time| time.saturating_add(self.first_time));
-        let time = time.ok_or(McapReadError::TimeGoesBack { seconds })?;
+        let time = in_whole_milliseconds(time.ok_or(McapReadError::TimeGoesBack { seconds })?);
         match last {
             Some(last) if time < last => return Err(McapReadError::TimeGoesBack { seconds }),
             Some(last) if time < last + RESOLUTION => return Ok(()),
@@ -137,6 +137,12 @@ impl Track {
         self.moments.push(Moment { time, pose, vacuum });
         Ok(())
     }
+}
+
+/// The nearest time that a text file can hold.
+fn in_whole_milliseconds(time: Duration) -> Duration {
+    let milliseconds = (time + RESOLUTION / 2).as_millis();
+    Duration::from_millis(u64::try_from(milliseconds).unwrap_or(u64::MAX))
 }
 
 /// The topic without its namespace.

@@ -101,7 +101,9 @@ impl SharedSimulation {
             let mut clock = self.clock();
             clock.ahead = clock.ahead.saturating_add_unsigned(before).saturating_sub_unsigned(after);
             clock.restores = clock.restores.saturating_add(1);
+            let is_paced = simulation.is_paced();
             *simulation = other;
+            simulation.set_paced(is_paced);
         });
     }
 

@@ -16,9 +16,9 @@ class ActionLog:
     All angles are degrees, the claw's too. Without a file it does nothing.
     """
 
-    def __init__(self, path: Path | None) -> None:
+    def __init__(self, path: Path | str | None) -> None:
         """Creates the file, or replaces it."""
-        self._file: TextIO | None = None if path is None else path.open("w", encoding="utf-8")
+        self._file: TextIO | None = None if path is None else Path(path).open("w", encoding="utf-8")
         self._observed: list[SupportsFloat] = []
         self._write(["time", *(f"{kind}.{name}" for kind in ("sent", "measured", "true") for name in NAMES)])
 

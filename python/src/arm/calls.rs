@@ -2,6 +2,7 @@
 
 use std::sync::{Arc, Mutex};
 
+use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 use sevenbot::approach::ApproachRule;
 use sevenbot::cartesian::{Guard, TipTarget};
@@ -100,11 +101,13 @@ impl Arm {
         Ok(raised(py, parked)?.map_err(|why| file_error(py, &path, &why))?.into())
     }
 
-    /// Records until the time is over, or a signal of Python ends a recording without a limit.
+    /// Records until the time is over, or Ctrl-C ends a recording without a limit.
     pub(super) fn record_moments(&self, py: Python<'_>, options: RecordOptions) -> PyResult<Recording> {
         let work = move |arm: &mut sevenbot::Arm, watch: &mut Watch<'_>| motion::record(arm, options, watch);
         let ((Recorded { text, arrivals }, outcome), signal) = self.worker.call_until_signal(py, work)?;
-        let failure = signal.filter(|_| options.limit.is_some()).or(raised(py, outcome).err());
+        let ends_it =
+            |signal: &PyErr| options.limit.is_none() && signal.is_instance_of::<PyKeyboardInterrupt>(py);
+        let failure = signal.filter(|signal| !ends_it(signal)).or(raised(py, outcome).err());
         let has_moments = !arrivals.is_empty();
         let recording = || Recording::of_text(py, &text).map(|recording| recording.with_arrivals(arrivals));
         match failure {

@@ -103,6 +103,8 @@ impl SetPointStream<'_> {
             if left.is_zero() {
                 return Ok(());
             }
+            // Short reads of the observer take their turn here.
+            observer.pause(self.arm(), Duration::ZERO);
             // Reports that come meanwhile would fill the buffer of the port.
             self.arm().next_report(left.min(POLL_PERIOD))?;
             self.keep_alive()?;

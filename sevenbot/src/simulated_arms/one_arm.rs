@@ -39,6 +39,7 @@ impl SteppedArm {
     pub(crate) fn become_copy(&mut self, other: &Simulation) {
         *self = Self::new(other.clone(), self.seed);
         self.simulation.set_seed(self.seed);
+        self.simulation.set_paced(false);
         self.observe();
     }
 

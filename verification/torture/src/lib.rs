@@ -15,8 +15,8 @@
 
 pub mod campaign;
 pub mod cli;
-pub mod seeded_rng;
 pub mod free_motion;
+pub mod seeded_rng;
 // Fuzz targets report a violated rule by a panic. Only the fuzzer and tests call them.
 #[allow(clippy::expect_used, clippy::indexing_slicing, clippy::panic, clippy::unwrap_used)]
 pub mod fuzz;
