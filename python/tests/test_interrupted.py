@@ -82,17 +82,6 @@ def test_a_cancelled_opening_leaves_no_stream_open() -> None:
     asyncio.run(run())
 
 
-def test_ctrl_c_is_not_lost_where_the_arm_does_not_answer(simulated_arm: sevenbot.SimulatedArm) -> None:
-    simulated_arm.simulation.fault("line=loss=100%")
-    with pytest.raises((KeyboardInterrupt, sevenbot.NoAnswer)) as raised:
-        threading.Timer(0.0, _thread.interrupt_main).start()
-        opened_by(simulated_arm)
-    if raised.type is not KeyboardInterrupt:
-        # The timer was late, and its signal comes now.
-        with pytest.raises(KeyboardInterrupt):
-            time.sleep(ENOUGH)
-
-
 def test_only_ctrl_c_ends_a_recording_as_if_it_were_over(simulated_arm: sevenbot.SimulatedArm) -> None:
     class Ended(Exception):
         pass

@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::ErrorKind;
 use std::path::PathBuf;
 
-use sevenbot::health::sentences;
+use sevenbot::health::{ProblemKind, sentences};
 use sevenbot::network::{self, Address};
 use sevenbot::ports::{self, PortInfo, ProbeResult};
 use sevenbot::wire_log::LoggedLine;
@@ -65,7 +65,7 @@ impl Session {
         let mut arm = self.connect()?;
         arm.let_watchdog_act()?;
         put_right(&mut arm)?;
-        warn_of_alarms(&mut arm)?;
+        warn_of_lame_joints(&mut arm)?;
         Ok(arm)
     }
 
@@ -127,10 +127,13 @@ pub(crate) fn put_right(arm: &mut Arm) -> Result<(), CommandError> {
     Ok(())
 }
 
-/// Warns if a servo has an alarm: its joint may hold no torque.
-fn warn_of_alarms(arm: &mut Arm) -> Result<(), CommandError> {
+/// Warns of what a move of other joints does not report: an alarm of a servo, whose joint may hold no torque, and joints that are
+/// silent or let go.
+fn warn_of_lame_joints(arm: &mut Arm) -> Result<(), CommandError> {
     let mut problems = arm.health()?.problems();
-    problems.retain(|problem| problem.kind.is_alarm());
+    let is_lame =
+        |kind: ProblemKind| kind.is_alarm() || matches!(kind, ProblemKind::NoAnswer | ProblemKind::LetGo);
+    problems.retain(|problem| is_lame(problem.kind));
     if !problems.is_empty() {
         warn(format_args!("{}; `sevenbot status` tells what to do", sentences(&problems)));
     }

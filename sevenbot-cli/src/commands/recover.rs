@@ -61,6 +61,8 @@ const RECOVERY_TIMEOUT: Duration = Duration::from_secs(6);
 /// (D27).
 const QUIET_TIME: Duration = Duration::from_secs(2);
 const POLL_PERIOD: Duration = Duration::from_millis(100);
+/// A joint this near to its target holds, in degrees: a load makes it droop.
+const HELD_DEGREES: u8 = 10;
 /// How long the motors are off to end an overload (forceless, then servo).
 const OFF_TIME: Duration = Duration::from_millis(500);
 
@@ -95,11 +97,14 @@ pub(crate) fn run(session: &mut Session, args: &RecoverArgs) -> Result<(), Comma
     }
     let after = wait_until_well(&mut arm)?;
     let left = after.problems();
-    let recovered = left.is_empty() && after.is_driven();
+    let mut away = after.away_from_targets(u8::MAX);
+    away.retain(|(_, position, target)| position.abs_diff(*target) > HELD_DEGREES);
+    let recovered = left.is_empty() && after.is_driven() && away.is_empty();
     let before = wrong.iter().map(Problem::to_string).collect();
     session.printer.print(&Recovered { recovered, before, status: ArmStatus::from(&after) })?;
     match (recovered, after.is_driven()) {
         (true, _) => Ok(()),
+        (_, true) if left.is_empty() => Err(MoveError::NotHeld { away }.into()),
         (_, true) => Err(CommandError::Arm(format!("not recovered: {}", sentences(&left)))),
         (_, false) => Err(CommandError::Arm("not recovered: the motors are off".to_owned())),
     }

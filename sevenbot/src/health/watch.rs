@@ -11,10 +11,11 @@
 use std::time::Duration;
 
 use protocol_core::registers::map::{
-    EFFECTOR_TYPE, FRAMES_ACCEPTED, MOTOR_STATE, SERVO_TEMPERATURE, SET_POINT_PERIOD, effector, motor_state,
+    EFFECTOR_TYPE, FRAMES_ACCEPTED, MOTOR_STATE, SERVO_ALARMS, SERVO_TEMPERATURE, SET_POINT_PERIOD, effector,
+    motor_state,
 };
 
-use super::{ALL_JOINTS, Problem, ProblemFlags, ProblemKind};
+use super::{ALARM_BITS, ALL_JOINTS, Problem, ProblemFlags, ProblemKind};
 use crate::status_block::has_restarted;
 use host_link::sharing::SharingState;
 use host_link::{Snapshot, Span};
@@ -25,6 +26,8 @@ pub(super) const REGISTERS: Span = Span::between(&SET_POINT_PERIOD, &SERVO_TEMPE
 pub(super) const STATE_REGISTERS: Span = Span::between(&MOTOR_STATE, &EFFECTOR_TYPE);
 /// The shortest time between two questions.
 const POLL_PERIOD: Duration = Duration::from_millis(100);
+/// A new alarm that no joint explains is a problem after this time.
+const ALARM_GRACE: Duration = Duration::from_secs(1);
 /// The questions and their answers take at most one part in this many of the line's capacity.
 const SHARE_OF_LINE: u32 = 10;
 /// Bits of a question and its answer on the line: 7 bytes each around the values, ten bits a byte.
@@ -77,6 +80,11 @@ pub struct MoveWatch {
     needs_motors: bool,
     /// The joints that have been blocked since before the move.
     blocked_before: u8,
+    /// The alarms at the first answer.
+    alarms_before: Option<u8>,
+    /// When other alarms came.
+    alarm_since: Option<Duration>,
+    is_at_end: bool,
     /// Is the effector a gripper? Then an obstacle of joint 7 is what it holds.
     is_gripper: bool,
     begun: Duration,
@@ -105,6 +113,9 @@ impl MoveWatch {
             joints,
             needs_motors: true,
             blocked_before: u8::MAX,
+            alarms_before: None,
+            alarm_since: None,
+            is_at_end: false,
             is_gripper: true,
             begun: now,
             baud,
@@ -151,6 +162,11 @@ impl MoveWatch {
             self.joints |= joints;
             self.begun = now;
         }
+    }
+
+    /// From now on a new alarm is a problem at once, because no later check would see it.
+    pub(super) const fn end(&mut self) {
+        self.is_at_end = true;
     }
 
     /// The registers to ask for now, if it is time for a question.
@@ -205,8 +221,20 @@ impl MoveWatch {
             flags.blocked &= !self.blocked_before;
         }
         let restarted = self.has_restarted(registers).then_some(Problem::of_arm(ProblemKind::Restarted));
-        let all = restarted.into_iter().chain(flags.problems(self.joints));
+        let all =
+            restarted.into_iter().chain(flags.problems(self.joints)).chain(self.new_alarms(registers, now));
         all.filter(|problem| self.needs_motors || problem.kind.hides_positions()).collect()
+    }
+
+    /// The alarms that were not there at the first answer. A servo with an alarm may have switched itself off. The arm tells soon
+    /// whether a joint that it drives has let go, which says more.
+    fn new_alarms(&mut self, registers: &Snapshot, now: Duration) -> impl Iterator<Item = Problem> + use<> {
+        let alarms = if registers.has_protection_block() { registers.byte(&SERVO_ALARMS) } else { 0 };
+        let new = alarms & !*self.alarms_before.get_or_insert(alarms);
+        self.alarm_since = self.alarm_since.or(Some(now)).filter(|_| new != 0);
+        let is_due = self.alarm_since.is_some_and(|since| self.is_at_end || now >= since + ALARM_GRACE);
+        let due = if is_due { new } else { 0 };
+        ALARM_BITS.into_iter().filter(move |(bit, _)| due & bit != 0).map(|(_, kind)| Problem::of_arm(kind))
     }
 
     /// Has the controller restarted since the last answer? A restart resets the counter of frames, and switches the stream

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use protocol_core::registers::Joint;
 use protocol_core::registers::map::{PRESENT_POSITION, SPEED, TARGET_POSITION, TIME};
 
-use super::error::{ConnectionLost, MoveError};
+use super::error::MoveError;
 use super::observer::{Observer, Stage};
 use super::pace::{Pace, PaceBefore};
 use crate::arm::Arm;
@@ -128,13 +128,11 @@ impl JointMove {
         MoveCheck::begin(arm, joints_of(&targets))?;
         let before = PaceBefore::read(arm, &targets)?;
         let begun = pace.set(arm, &targets).and_then(|()| Self::begin_fine(arm, targets));
-        // A second failure has the same reason, so it is ignored. After a failed exchange the arm may have taken the
-        // targets, so `put_back` leaves the pace of moving joints alone.
-        let _ = match &begun {
-            Ok(_) => Ok(()),
-            Err(error) if error.is_connection_lost() => before.put_back(arm),
-            Err(_) => before.put_back_at_once(arm),
-        };
+        if begun.is_err() {
+            // A second failure has the same reason, so it is ignored. The arm may have taken the targets: `put_back` leaves the
+            // pace of joints that move.
+            let _ = before.put_back(arm);
+        }
         begun
     }
 
@@ -250,7 +248,10 @@ impl JointMove {
             self.report(observer, Stage::Settling, &last);
         }
         match self.away(&last, TOLERANCE_DEGREES, state).as_slice() {
-            [] => Ok(last),
+            [] => {
+                check.check_at_end(arm)?;
+                Ok(last)
+            }
             away => Err(self.not_reached(arm, away.to_vec())),
         }
     }

@@ -10,16 +10,16 @@
 use std::time::Duration;
 
 use protocol_core::registers::Joint;
-use protocol_core::registers::map::{MOTOR_STATE, PRESENT_POSITION, SPEED, TIME, motor_state};
+use protocol_core::registers::map::{MOTOR_STATE, PRESENT_POSITION, motor_state};
 
 use super::error::MoveError;
 use super::joint_move::JointMove;
 use super::observer::Observer;
-use super::pace::Pace;
+use super::pace::{Pace, PaceBefore};
 use crate::arm::Arm;
 use crate::fine_angle::FineAngle;
 use crate::fine_state::FineTargets;
-use crate::health::MoveCheck;
+use crate::health::{MoveCheck, Problem, ProblemKind};
 use crate::units::Speed;
 use host_link::Span;
 
@@ -82,11 +82,16 @@ impl Arm {
         observer: &mut dyn Observer,
     ) -> Result<[FineAngle; 7], ParkError> {
         self.driven_joints()?;
-        let before = self.read_span(Span::between(&SPEED, &TIME))?;
+        let all_joints = self.park_positions()?.map(Some);
+        let before = PaceBefore::read(self, &all_joints)?;
         let moved = self.go_to_park_pose(pose, observer);
-        let restored = self.write_checked(before.address, &before.values);
+        if moved.is_err() {
+            // Joints that are on their way would go on at the speeds of before. What does not hold is told by `moved`.
+            let _ = self.hold_and_watch();
+        }
+        let restored = before.put_back(self);
         moved?;
-        restored.map_err(MoveError::from)?;
+        restored?;
         self.let_go_and_watch(pose.is_some(), observer)
     }
 
@@ -114,7 +119,15 @@ impl Arm {
         let start = self.park_positions()?;
         self.write_motion(MOTOR_STATE.address, &[motor_state::DAMPING])?;
         let stayed = self.watch_parked(&start, is_own_pose, observer);
-        if let Err(ParkError::Sinks { .. } | ParkError::Move(MoveError::Interrupted)) = stayed {
+        let holds_again = match &stayed {
+            Err(ParkError::Sinks { .. } | ParkError::Move(MoveError::Interrupted)) => true,
+            // Of one joint: the others hold what they can.
+            Err(ParkError::Move(MoveError::Problems(problems))) => {
+                problems.iter().all(|problem| problem.joint.is_some())
+            }
+            _ => false,
+        };
+        if holds_again {
             self.write_motion(MOTOR_STATE.address, &[motor_state::SERVO])?;
         }
         stayed
@@ -131,8 +144,13 @@ impl Arm {
         let begin = self.now();
         let end = begin + if is_own_pose { WATCH_TIME_OF_OWN_POSE } else { WATCH_TIME };
         let mut settled = None;
+        let mut check = MoveCheck::of_positions(self);
         loop {
             let now = self.park_positions()?;
+            check.check(self).map_err(MoveError::from)?;
+            if self.joints()?.motor_state() != motor_state::DAMPING {
+                return Err(MoveError::Problems(vec![Problem::of_arm(ProblemKind::Restarted)]).into());
+            }
             if self.now() >= begin + SETTLING_TIME {
                 settled.get_or_insert(now);
             }

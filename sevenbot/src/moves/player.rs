@@ -216,10 +216,13 @@ impl Player {
     /// Streams all points once. The arm stands at the first one.
     fn stream(&self, tape: &mut Tape, arm: &mut Arm, observer: &mut dyn Observer) -> Result<(), MoveError> {
         let options = StreamOptions::new(PERIOD_MS).ok_or(StreamError::NoExtendedBlock)?;
-        // The points set the speed, so the registers must not limit it. The recording was checked, and the arm is at its
-        // first pose.
-        arm.write_checked(SPEED.address, &[Speed::MAXIMUM.steps(); 7])?;
         let mut stream = SetPointStream::open(arm, options)?;
+        // The points set the speed, so the registers must not limit it. The recording was checked, and the arm is at its
+        // first pose. The stream is open before, because the next program puts right what an open one left behind.
+        let unlimited = stream.arm().write_checked(SPEED.address, &[Speed::MAXIMUM.steps(); 7]);
+        if let Err(error) = unlimited {
+            return self.end_stream(stream, Err(error.into()));
+        }
         let vacuum = self.moments.first().map(|first| first.vacuum);
         tape.restart(stream.arm());
         let run = MovementRun::along(self.path.clone(), vacuum, stream.arm().elapsed(), options.period());

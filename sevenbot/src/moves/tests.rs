@@ -6,9 +6,12 @@ use std::time::Duration;
 use protocol_core::registers::Joint;
 use protocol_core::registers::map::{LIMITS, MOTOR_STATE, SET_POINT_PERIOD, SPEED, limit, motor_state};
 
-use super::{ConnectionLost, JointMove, MoveError, Observer, Pace, PaceBefore, Player, Recorder, Stage};
+use super::{
+    ConnectionLost, JointMove, MoveError, Observer, Pace, PaceBefore, ParkError, Player, Recorder, Stage,
+};
 use crate::arm::Arm;
 use crate::fine_angle::FineAngle;
+use crate::fine_state::FineTargets;
 use crate::health::{Problem, ProblemKind};
 use crate::recording::Recording;
 use crate::simulated::{self, SharedSimulation, SimulationConfig};
@@ -75,6 +78,74 @@ fn without_supply_nothing_is_written_so_that_the_motors_stay_off_when_it_comes_b
     arm.sleep(Duration::from_secs(2));
     assert_eq!(arm.joints().map(|joints| joints.motor_state()), Ok(motor_state::DAMPING));
     assert_eq!(arm.engage_and_watch(), Ok(()));
+}
+
+fn act(simulation: &SharedSimulation, action: &str) {
+    simulation.with(|arm| drop(arm.act(action.parse().expect("an action"))));
+}
+
+fn pose(degrees: [u8; 7]) -> FineTargets {
+    degrees.map(|degrees| FineAngle::from_degrees(degrees.into()))
+}
+
+#[test]
+fn a_park_that_fails_lets_no_joint_race() {
+    let (mut arm, simulation) = driven_arm();
+    let folded = pose([90, 90, 100, 90, 140, 90, 80]);
+    JointMove::begin_fine(&mut arm, folded)
+        .and_then(|there| there.finish(&mut arm, &mut ()))
+        .expect("a pose");
+    arm.write_checked(SPEED.address, &[0; 7]).expect("taken");
+    set_fault(&simulation, "5=stuck");
+    assert!(matches!(arm.park(None, &mut ()), Err(ParkError::Move(MoveError::Problems(_)))));
+    let positions = |arm: &mut Arm| arm.joints().expect("an answer").positions();
+    let before = positions(&mut arm);
+    arm.sleep(Duration::from_secs(2));
+    let after = positions(&mut arm);
+    assert!(
+        before.iter().zip(after).all(|(before, after)| before.abs_diff(after) <= 2),
+        "{before:?} to {after:?}"
+    );
+    assert_eq!(arm.read(SPEED.address, 7), Ok(vec![0; 7]));
+}
+
+/// Acts once, when the motors are off.
+struct WhenLetGo(SharedSimulation, Option<&'static str>);
+
+impl Observer for WhenLetGo {
+    fn pause(&mut self, arm: &mut Arm, time: Duration) {
+        arm.sleep(time);
+        if arm.joints().is_ok_and(|joints| !joints.is_driven())
+            && let Some(action) = self.1.take()
+        {
+            act(&self.0, action);
+        }
+    }
+}
+
+#[test]
+fn an_arm_is_not_parked_if_something_happens_while_it_is_watched() {
+    for action in ["fault 3=missing", "fault supply=off", "restart", "power-cycle"] {
+        let (mut arm, simulation) = driven_arm();
+        let parked = arm.park(None, &mut WhenLetGo(simulation, Some(action)));
+        assert!(matches!(parked, Err(ParkError::Move(_))), "{action}: {parked:?}");
+    }
+}
+
+#[test]
+fn a_servo_that_switches_itself_off_ends_a_move_and_an_older_alarm_does_not() {
+    let (mut arm, simulation) = driven_arm();
+    let slowly = Pace { speed: Speed::from_steps(5), time: None };
+    let go = |arm: &mut Arm, degrees| {
+        JointMove::begin_at_pace(arm, pose([90, degrees, 65, 90, 90, 90, 80]), slowly)
+    };
+    let begun = go(&mut arm, 110).expect("taken");
+    arm.sleep(Duration::from_millis(500));
+    act(&simulation, "trip 7");
+    let Err(MoveError::Problems(problems)) = begun.finish(&mut arm, &mut ()) else { panic!("it is told") };
+    assert!(problems.contains(&Problem::of_arm(ProblemKind::Overload)), "{problems:?}");
+    let again = go(&mut arm, 100).and_then(|begun| begun.finish(&mut arm, &mut ()));
+    assert!(again.is_ok(), "{again:?}");
 }
 
 #[test]
