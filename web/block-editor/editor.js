@@ -1,5 +1,5 @@
-// The editor of block programs: Blockly with the blocks of the arm. Knows nothing of the arm: the page reads the text of the
-// program and lights its blocks. `cargo xtask web` puts Blockly, its texts and the table of blocks in front of this file.
+// The editor of block programs: Blockly with the blocks of the arm. It has no connection to the arm: the page reads the text of
+// the program and lights its blocks. `cargo xtask web` puts Blockly, its texts and the table of blocks in front of this file.
 
 var blockEditor = (() => {
   "use strict";
@@ -8,7 +8,7 @@ var blockEditor = (() => {
   let workspace = null;
   let shown = null;
 
-  // The colours of style.css where the user prefers dark ones. Blocks keep theirs.
+  // The colours of style.css for users who prefer a dark page. Blocks have the same colours on both.
   const prefersDark = matchMedia("(prefers-color-scheme: dark)");
   const dark = Blockly.Theme.defineTheme("arm-dark", {
     base: Blockly.Themes.Classic,
@@ -24,13 +24,14 @@ var blockEditor = (() => {
     adoptStyles();
   });
 
-  // White text can be read on blocks of this brightness: at least 4.5 to 1.
+  // At this brightness, white text has a contrast of at least 4.5 to 1 on every block (WCAG 2, AA).
   Blockly.utils.colour.setHsvValue(0.5);
   Blockly.dialog.setPrompt(ask);
-  // The page shows what happens in its own places.
+  // Discard Blockly's alerts: the page shows its own messages.
   Blockly.dialog.setAlert((_, done) => done?.());
 
-  // Blockly makes its styles as text, which the content security policy does not allow as an element.
+  // Blockly's styles are in `template` elements, because the content security policy forbids inline `style` elements. Adopt
+  // them as style sheets.
   function adoptStyles() {
     for (const text of document.querySelectorAll("template#blockly-common-style, template.blockly-renderer-style")) {
       if (text.dataset.adopted) continue;
@@ -41,7 +42,7 @@ var blockEditor = (() => {
     }
   }
 
-  // Asks for a name. A dialog of the browser would stop the page, and with it the arm's program.
+  // Asks for a name. `prompt()` would block the page, and with it the program that moves the arm.
   function ask(message, suggested, done) {
     const dialog = document.getElementById("ask");
     const field = dialog.querySelector("input");
@@ -55,7 +56,7 @@ var blockEditor = (() => {
     field.select();
   }
 
-  // Shows the editor in an element, in a language, with the program that it had. `changed` is called after each edit.
+  // Shows the editor in an element, in this language. The present program stays. Calls `changed` after each edit.
   function open(element, language, changed) {
     const program = workspace ? text() : null;
     workspace?.dispose();
@@ -81,7 +82,8 @@ var blockEditor = (() => {
     return JSON.stringify(Blockly.serialization.workspaces.save(workspace));
   }
 
-  // Returns why the text is no program, or an empty text. Undo brings the program back that was there.
+  // Shows a program. Returns an empty text, or the error if the text is no program: then the last program stays. With `canUndo`,
+  // undo brings the last program back.
   function load(program, canUndo) {
     const before = Blockly.serialization.workspaces.save(workspace);
     try {
@@ -93,12 +95,12 @@ var blockEditor = (() => {
     }
   }
 
-  // Lights one block, or none.
+  // Lights the block with this id, and no other. An empty id lights no block.
   function light(id) {
     workspace.highlightBlock(id || null);
   }
 
-  // Shows what is wrong at a block; without a text at no block.
+  // Shows a warning at this block, and removes all others. Without an id or a text, only removes them.
   function warn(id, message) {
     for (const block of workspace.getAllBlocks(false)) block.setWarningText(null);
     const block = id && workspace.getBlockById(id);
@@ -107,7 +109,7 @@ var blockEditor = (() => {
     workspace.centerOnBlock(id);
   }
 
-  // Adds a pose below the last block of the program.
+  // Adds a block for a pose, with angles in degrees, below the last block of the program.
   function addPose(angles) {
     let last = workspace.getBlocksByType("arm_start", false)[0];
     while (last?.getNextBlock()) last = last.getNextBlock();
@@ -126,13 +128,13 @@ var blockEditor = (() => {
     return new Uint8Array(await new Blob(parts).arrayBuffer());
   }
 
-  // A program as letters for an address.
+  // Compresses a program, and encodes it as base64url for an address.
   async function pack(program) {
     const bytes = await piped(program, new CompressionStream("deflate-raw"));
     return btoa(String.fromCharCode(...bytes)).replaceAll("+", "-").replaceAll("/", "_").replaceAll("=", "");
   }
 
-  // The program of an address; empty if it is none.
+  // Decodes what `pack` has made. Returns an empty text if the letters hold no program.
   async function unpack(letters) {
     try {
       const bytes = Uint8Array.from(atob(letters.replaceAll("-", "+").replaceAll("_", "/")), (letter) => letter.charCodeAt(0));

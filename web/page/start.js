@@ -1,18 +1,19 @@
 import init, * as sevenbot from "./sevenbot_web.js";
 
-// What the first view does not need.
+// The second part of the module, which the first picture does not need.
 const REST = new URL("rest.wasm", import.meta.url);
 
 const first = await init({ module_or_path: new URL("sevenbot_web_bg.wasm", import.meta.url) });
 let isRestThere = false;
 
-// The request that blocks may be quicker than the other one, which then changes nothing.
+// `loadRest` may be faster than `loadRestInTime`. The later of the two has no effect.
 function enter(module) {
   if (!isRestThere) new WebAssembly.Instance(module, { first });
   isRestThere = true;
 }
 
-// The module calls this before it uses its rest, and cannot wait: a request that blocks, without the types of others.
+// The first part of the module calls this before it uses the rest. The call is synchronous, so the request has to block. Such a
+// request cannot return an `ArrayBuffer`: the bytes come as characters.
 window.loadRest = () => {
   if (isRestThere) return;
   const request = new XMLHttpRequest();

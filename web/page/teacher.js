@@ -1,7 +1,7 @@
-// The teacher's screen: what the class tells, as tiles; and what the teacher wants, as messages. Every text of a pupil is shown
-// as text. The messages are described in docs/class.md.
+// The teacher's screen: shows each pupil as a tile, and sends the teacher's commands. A text of a pupil is shown as plain
+// text, never as HTML. docs/class.md describes the messages.
 
-// Names: English, Chinese.
+// Each text by its name: English, Chinese.
 const TEXTS = {
   title: ["7Bot V2: the class", "7Bot V2：课堂"],
   language: ["中文", "English"],
@@ -68,13 +68,13 @@ const TEXTS = {
 };
 const BAD = ["no_arm", "stop_failed", "blocked", "problem"];
 const RETRY_MS = 1000;
-// After so many attempts a class that has ended is more likely than an interrupted network.
+// After this many failed attempts, the class has more likely ended than the network is interrupted.
 const MOST_REFUSED = 5;
-// The class tells news twice a second at least.
+// The server sends the state of the class at least twice a second. Silence for this long counts as a lost connection.
 const SILENCE_MS = 3000;
 
 const $ = id => document.getElementById(id);
-// Where the browser blocks its storage, nothing is kept.
+// Access to the storage throws if the browser blocks it. Then return null.
 const stored = act => {
   try {
     return act();
@@ -86,10 +86,10 @@ let language = (stored(() => localStorage.getItem("language")) ?? navigator.lang
 const text = name => TEXTS[name][language];
 let socket, welcome, shown;
 let drawn = 0;
-// Attempts to connect since the last connection.
+// The number of lost or failed connections since a connection was last opened.
 let refused = 0;
 
-// A screen reader reads a live text only when it changes.
+// Change a text only if it differs: a screen reader announces a live region on each change.
 function setText(element, value) {
   if (element.textContent !== value) element.textContent = value;
 }
@@ -99,7 +99,7 @@ function notice(value) {
   $("notice-bar").hidden = value === "";
 }
 
-// The secret leaves the address, which a beamer shows. This tab keeps it for a reload.
+// Remove the secret from the address bar, which a projector may show. The storage of this tab keeps it for a reload.
 function takeSecret() {
   const given = new URLSearchParams(location.search).get("token");
   if (given) {
@@ -131,7 +131,7 @@ function connect(secret) {
   };
   const hear = () => {
     clearTimeout(silence);
-    // A network that is gone closes nothing.
+    // A network failure does not close the socket, so a timer detects it.
     silence = setTimeout(end, SILENCE_MS);
   };
   socket.onopen = () => {
@@ -240,7 +240,7 @@ function showTile(tile, pupil) {
   const { report, presence } = pupil;
   const isHolder = shown.arm?.holder === pupil.pupil;
   const doing = presence === "here" ? report && TEXTS.doing[report.doing][language] : text(presence);
-  // An arm that moves again is not told as stopped.
+  // Do not show "stopped" for an arm that moves again.
   const isStopped = pupil.stop === "asked" || ["stopped", "limp"].includes(report?.doing);
   const stopped = isStopped && { asked: "stopping_all", holds: "stopped", limp: "limp_stopped" }[pupil.stop];
   const goals = report?.goals;
@@ -265,7 +265,8 @@ function showTile(tile, pupil) {
   draw(part("picture"), report?.points, isBad);
 }
 
-// From a corner, so that each direction shows: x to the right, y to the back, z up. Millimetres to pixels of the canvas.
+// Projects a point in mm to pixels of the canvas. The view is from a corner, so that each axis is visible: x to the right, y to
+// the back, z up.
 const place = ([x, y, z]) => [120 + 0.3 * (x - 0.45 * (y - 120)), 150 - 0.3 * (z + 60 + 0.35 * (y - 120))];
 
 function draw(canvas, points, isBad) {
@@ -276,7 +277,7 @@ function draw(canvas, points, isBad) {
   canvas.dataset.shape = shape;
   const context = canvas.getContext("2d");
   const paint = name => {
-    // The browser knows what light-dark() means for an element.
+    // Let the browser resolve `light-dark()`, which needs an element: the canvas does not accept it.
     canvas.style.color = `var(${name})`;
     return getComputedStyle(canvas).color;
   };
@@ -334,11 +335,11 @@ document.addEventListener("click", event => {
 });
 document.addEventListener("keydown", event => {
   if (event.key === " " && event.target.id !== "say") {
-    // Also on buttons, which the space bar would press: a stop works from everywhere.
+    // The space bar stops everywhere. On a button it must not press the button, too.
     event.preventDefault();
     if (!event.repeat) ACTIONS.stop();
   }
-  // The Enter that ends the input of Chinese sends nothing.
+  // An Enter that confirms Chinese input in an input method must not send the text.
   if (event.key === "Enter" && event.target.id === "say" && !event.isComposing) ACTIONS.say();
 });
 // Some browsers click a button when the space bar is released.

@@ -1,4 +1,4 @@
-//! What the registers say of an arm, in units.
+//! The state of an arm, decoded from its registers to physical units.
 
 use kinematics::geometry::{LINKAGE_MAX, LINKAGE_MIN};
 use kinematics::{forward, limits};
@@ -9,19 +9,20 @@ use sevenbot::map::{
 };
 use sevenbot::{FineAngle, Health, Joint, MoveTime, Problem, ProblemKind, Snapshot, Speed};
 
-/// A joint is stalled at more than this distance from its target, in degrees. Under its load a servo that works is nearer.
+/// A joint at rest is stalled if its distance from its target is larger than this, in degrees. The load on a working servo causes
+/// a smaller distance.
 const STALLED_DISTANCE: f32 = 3.0;
-/// An arm at the end of its linkage is measured this far beyond it, in degrees.
+/// Tolerance for the limits of the linkage, in degrees: an arm at a limit may measure this much beyond it.
 const LINKAGE_PLAY: f64 = 1.0;
-/// A joint below this velocity rests, in degrees per second.
+/// A joint that is slower than this is at rest, in degrees per second.
 const RESTING_VELOCITY: f32 = 1.0;
 
 /// An arm at one instant, joint 1 first.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ArmState {
-    /// In degrees; `None` for a joint that was not measured since power-up.
+    /// The present positions in degrees, the last ones of silent joints; `None` for a joint not measured since power-up.
     pub measured: [Option<f32>; 7],
-    /// In degrees.
+    /// The target positions in degrees.
     pub targets: [f32; 7],
     /// In degrees per second, positive towards greater angles. 0 from an arm without the extended block.
     pub velocities: [f32; 7],
@@ -31,24 +32,24 @@ pub struct ArmState {
     pub motor_state: u8,
     /// Register 241.
     pub faults: u8,
-    /// Bit n-1 for joint n, as in `moving`.
+    /// Register 242: the joints whose servos do not answer, bit n-1 for joint n.
     pub missing: u8,
-    /// Joints whose set-point moves.
+    /// Register 243: the joints whose set-point has not reached its target, bit n-1 for joint n.
     pub moving: u8,
-    /// Joints that something holds, or whose servo gives no force: those that the arm reports, and those of 1 to 6 that rest away
-    /// from their target. A gripper that holds something rests away from its target, too. 0 from an arm without the extended
-    /// block.
+    /// The stalled joints, bit n-1 for joint n: those that the arm reports as blocked or let go, and those of joints 1 to 6 that
+    /// rest away from their target. Joint 7 may rest away from its target because it holds something. 0 if the motors are off, or
+    /// from an arm without the extended and status blocks.
     pub stalled: u8,
-    /// What needs attention, the most important first.
+    /// The problems that need attention, the most important first.
     pub problems: Vec<Problem>,
-    /// In volts; `None` while unknown.
+    /// The supply of the servos in volts; `None` while unknown.
     pub volts: Option<f32>,
-    /// Of the hottest servo, in degrees Celsius; `None` while unknown.
+    /// The temperature of the hottest servo, in degrees Celsius; `None` while unknown.
     pub celsius: Option<u8>,
 }
 
 impl ArmState {
-    /// From registers 0 to 255.
+    /// Decodes registers 0 to 255.
     #[must_use]
     pub fn new(registers: &Snapshot) -> Self {
         let is_fine = registers.has_extended_block();
@@ -104,7 +105,8 @@ impl ArmState {
         stalled.fold(0, |bits, (((index, _), _), _)| bits | 1 << index)
     }
 
-    /// The angles of joints whose servos answer. A silent servo leaves its last angle in the registers.
+    /// The measured angles in degrees; `None` for a joint that was not measured or whose servo does not answer now: its registers
+    /// keep the last angle.
     #[must_use]
     pub fn answered(&self) -> [Option<f32>; 7] {
         let mut angles = self.measured;
@@ -120,7 +122,7 @@ impl ArmState {
         self.answered().iter().take(6).all(Option::is_some).then(|| tip(self.angles()))
     }
 
-    /// The measured angles, and the targets of joints that were not measured.
+    /// The measured angle of each joint, or its target if it was not measured, in degrees.
     #[must_use]
     pub fn angles(&self) -> [f32; 7] {
         let mut angles = self.targets;
@@ -131,7 +133,7 @@ impl ArmState {
     }
 }
 
-/// The tip at these angles: x, y, z in mm.
+/// The position of the tip at these angles in degrees: x, y, z in mm.
 #[must_use]
 pub fn tip(angles: [f32; 7]) -> [f64; 3] {
     let [t1, t2, t3, t4, t5, t6, _] = angles.map(f64::from);
@@ -139,7 +141,8 @@ pub fn tip(angles: [f32; 7]) -> [f64; 3] {
     [tip.x, tip.y, tip.z]
 }
 
-/// Where the guard of the workspace does not allow the way of the joints to these angles, at the speeds of the registers.
+/// Checks the path of the joints to these angles in degrees, at the speeds and times of the registers, against the guard of the
+/// workspace. Returns the first breach; `None` if the guard allows the path.
 #[must_use]
 pub fn breach_on_way(registers: &Snapshot, to: [f32; 7]) -> Option<Breach> {
     let [from, to] = [ArmState::new(registers).angles(), to].map(first_five);
@@ -152,8 +155,8 @@ pub fn breach_on_way(registers: &Snapshot, to: [f32; 7]) -> Option<Breach> {
     Guard::default().check_path(&path).err().map(|on_way| on_way.breach)
 }
 
-/// The name of the text that says where a part of the arm must not be at these angles, and is: below the table, in the base, or
-/// beyond the linkage.
+/// Checks a pose in degrees. Returns the name of a text if a part of the arm is below the table or in the base, or if joints 2
+/// and 3 are beyond the limits of their linkage.
 #[must_use]
 pub fn misplaced(angles: [f32; 7]) -> Option<&'static str> {
     let [_, t2, t3, ..] = angles;
@@ -168,7 +171,7 @@ fn first_five(angles: [f32; 7]) -> [f64; 5] {
     [t1, t2, t3, t4, t5]
 }
 
-/// The name of the text that says what a breach is.
+/// The name of the text that describes a breach.
 #[must_use]
 pub const fn breach_text(breach: &Breach) -> &'static str {
     match breach.obstacle {
@@ -177,7 +180,8 @@ pub const fn breach_text(breach: &Breach) -> &'static str {
     }
 }
 
-/// The frame that sends one joint, 1 to 7, to an angle in degrees. `None` if there is no such joint or angle.
+/// The address and values of the write that sets the target of one joint, 1 to 7, to an angle in degrees. Rounds to whole
+/// degrees on an arm without the extended block. `None` if there is no such joint or angle.
 #[must_use]
 pub fn target_frame(registers: &Snapshot, joint: u8, degrees: f32) -> Option<(u8, Vec<u8>)> {
     let joint = sevenbot::Joint::new(joint)?;

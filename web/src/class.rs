@@ -1,4 +1,4 @@
-//! A tab in a class: what it says, and what it hears. The WebSocket is elsewhere.
+//! The protocol of a pupil's tab in a class: makes its messages and interprets those of the server, without the WebSocket.
 //!
 //! ```text
 //!   ToPupil in JSON ──▶ Membership ──▶ ToPupil: what the page has to do
@@ -14,20 +14,20 @@ use crate::arm_state::ArmState;
 use crate::client::Client;
 use crate::stop::StopProgress;
 
-/// What a tab is in a class.
+/// The membership of a tab in a class.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Membership {
     wanted: String,
     key: Option<String>,
     is_welcome: bool,
-    /// The last stop for all, and how it ended.
+    /// The number of the teacher's last stop, and its outcome; `None` until the arm has confirmed it.
     stop: Option<(u32, Option<StopOutcome>)>,
-    /// The end of the stop has to be said.
+    /// The outcome of the stop still has to be sent.
     is_confirmation_due: bool,
 }
 
 impl Membership {
-    /// A tab whose pupil wants this name. It has the key of before, if it was in the class before.
+    /// A tab that wants to join with this name. `key` is its secret from an earlier join, and makes it the same pupil again.
     #[must_use]
     pub const fn new(wanted: String, key: Option<String>) -> Self {
         Self { wanted, key, is_welcome: false, stop: None, is_confirmation_due: false }
@@ -39,26 +39,26 @@ impl Membership {
         &self.wanted
     }
 
-    /// The secret of this tab.
+    /// The secret of this tab; `None` before its first join.
     #[must_use]
     pub fn key(&self) -> Option<&str> {
         self.key.as_deref()
     }
 
-    /// Has the class taken it in, since the start of the page?
+    /// Has the class accepted this tab since its pupil asked to join?
     #[must_use]
     pub const fn is_welcome(&self) -> bool {
         self.is_welcome
     }
 
-    /// The first message of a connection.
+    /// The first message on each connection: asks to join.
     #[must_use]
     pub fn hello(&self) -> String {
         FromPupil::Join { name: self.wanted.clone(), key: self.key.clone() }.to_json()
     }
 
-    /// Takes a message of the class. `None` if the page has nothing to do: the arm has taken this stop, or a newer server sends a
-    /// message that this page does not know.
+    /// Interprets a message of the class. Returns `None` if the page has nothing to do: the arm has confirmed this stop before,
+    /// or the message is unknown, for example from a newer server.
     pub fn receive(&mut self, text: &str) -> Option<ToPupil> {
         let message = ToPupil::parse(text)?;
         match &message {
@@ -69,7 +69,7 @@ impl Membership {
         Some(message)
     }
 
-    /// A stop came, perhaps again: the class may not have heard how it ended.
+    /// Takes a stop. Returns false if its outcome is known already. Then the outcome is sent again, because the server lacks it.
     fn is_new_stop(&mut self, number: u32) -> bool {
         self.is_confirmation_due = matches!(self.stop, Some((known, Some(_))) if known == number);
         if !self.is_confirmation_due {
@@ -78,7 +78,7 @@ impl Membership {
         !self.is_confirmation_due
     }
 
-    /// What the tab has to say of the last stop for all, if its arm has come so far.
+    /// The message that confirms the teacher's last stop; `None` until the arm has stopped, and after it was sent once.
     pub fn confirmation(&mut self, progress: StopProgress) -> Option<String> {
         let (number, outcome) = self.stop.as_mut()?;
         if outcome.is_none() {
@@ -101,7 +101,7 @@ pub fn stop_of_the_real_arm() -> String {
     FromPupil::StopArm.to_json()
 }
 
-/// What the page does with the arm by itself.
+/// What moves the arm, other than a person.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Activity {
     /// Nothing.
@@ -115,7 +115,7 @@ pub enum Activity {
     Parking,
 }
 
-/// The answer to [`ToPupil::Ask`].
+/// The answer to [`ToPupil::Ask`]. `is_hidden`: the tab is in the background.
 #[must_use]
 pub fn report(client: &Client, activity: Activity, goals: Option<Goals>, is_hidden: bool) -> String {
     let state = client.state();
@@ -126,7 +126,7 @@ pub fn report(client: &Client, activity: Activity, goals: Option<Goals>, is_hidd
     FromPupil::Report(Report { points, doing, goals, is_hidden }).to_json()
 }
 
-/// The most important thing first, as in the line below the title of the page.
+/// What the arm does, in one word. If several facts apply, the most important one wins, as in the line below the page's title.
 fn doing(state: &ArmState, stop: StopProgress, activity: Activity) -> Doing {
     match (stop, activity) {
         (StopProgress::Failed, _) => Doing::StopFailed,
@@ -143,7 +143,7 @@ fn doing(state: &ArmState, stop: StopProgress, activity: Activity) -> Doing {
     }
 }
 
-/// The points of the arm at these angles, in mm.
+/// The points from which the teacher's screen draws the arm: shoulder, elbow, forearm, wrist and tip, in mm.
 #[expect(clippy::cast_possible_truncation, reason = "the arm is shorter than a metre, and `as` saturates")]
 fn points(angles: [f32; 7]) -> [[i16; 3]; POINTS] {
     let [t1, t2, t3, t4, t5, t6, _] = angles.map(f64::from);
@@ -205,7 +205,7 @@ mod tests {
         assert_eq!(member.confirmation(tab.client.stop_progress()).as_deref(), Some(STOPPED));
         assert_eq!(reported(&tab, Activity::None).doing, Doing::Stopped);
         assert_eq!(member.confirmation(tab.client.stop_progress()), None, "once");
-        // The pupil goes on. The same stop does not stop the arm again.
+        // The pupil moves the arm again. A repetition of the same stop does not stop it.
         send(&mut tab, 1, 90.0);
         assert_eq!(member.receive(STOP), None);
         assert_eq!(member.confirmation(tab.client.stop_progress()).as_deref(), Some(STOPPED));

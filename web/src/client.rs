@@ -1,4 +1,4 @@
-//! Speaks with an arm: reads its registers again and again, and writes what a person wants.
+//! The client of an arm: reads its registers in an endless series of rounds, and writes the commands of a person.
 //!
 //! ```text
 //!   write, stop ──▶ ┌────────┐ ──▶ ┌──────────┐ ──▶ bytes to the arm
@@ -6,7 +6,7 @@
 //!   registers   ◀── └────────┘ ◀── └──────────┘ ◀── bytes from the arm
 //! ```
 //!
-//! Writes have no reply (D6): the registers that are read again show their effect. This file does no input or output.
+//! Writes have no reply (D6): only later reads show their effect. This file does no input or output.
 
 use std::collections::VecDeque;
 
@@ -20,37 +20,39 @@ use sevenbot::{Snapshot, Span};
 use crate::arm_state::ArmState;
 use crate::stop::{Stop, StopProgress, hold_frames};
 
-/// A read without a reply is lost after 400 ms. A reply at 115,200 baud, through a server, takes a tenth of it.
+/// Two attempts of 200 ms: a read without a reply is lost after 400 ms. At 115,200 baud and through a server, a reply takes about
+/// a tenth of that.
 const PATIENCE: Patience = Patience { attempts: 2, timeout: Duration::from_millis(200) };
-/// An arm is gone after this many rounds in which a reply was lost.
+/// The arm counts as disconnected after this many consecutive rounds in which a reply was lost.
 const LOST_ROUNDS: u32 = 3;
-/// How many writes, and frames that were not asked for, are kept to be shown.
+/// The number of writes and unsolicited frames that are kept for the page to show.
 const KEPT_FRAMES: usize = 40;
-/// The baud rate of the arm's line where nothing else is known.
+/// The baud rate that is assumed for the arm's line: the default of register 12.
 pub const BAUD: u32 = 115_200;
 
-/// What each round reads, with the registers of a server before those of the arm's status.
+/// The registers that each round reads. The last range begins with the registers of a server, before the status block.
 const ROUND: [Span; 3] = [
     Span::between(&DEVICE_CODE, &PRESENT_POSITION),
     Span::between(&FINE_TARGET, &PROTECTION_VERSION),
     Span::one(sharing::FIRST).through(&SERVO_TEMPERATURE),
 ];
 
-/// A frame that is shown: its time, true for one to the arm, and its content.
+/// A frame that the page shows: its time, whether it goes to the arm, and its content.
 pub type ShownFrame = (Instant, bool, Traffic);
 
-/// One end of the line to an arm.
+/// The client's end of the line to an arm.
 pub struct Client {
     link: HostLink,
     to_send: Vec<u8>,
     /// The last known value of each register.
     registers: Snapshot,
-    /// The time of the last write or round: each has a time of its own, so that their order is known.
+    /// The time of the last write or round. Each gets a unique time, so that the times tell their order.
     last_time: Instant,
-    /// When the reads of this round were queued, and those of the last complete one.
+    /// When the reads of the current round were queued.
     round_begun: Instant,
+    /// When the reads of the last complete round were queued.
     read_since: Instant,
-    /// Reads of this round without an end.
+    /// The reads of this round that have neither a reply nor a timeout yet.
     awaited: Vec<RequestId>,
     /// Was a reply of this round lost?
     is_round_lost: bool,
@@ -86,13 +88,13 @@ impl Client {
         self.rounds > 0 && self.lost_rounds < LOST_ROUNDS
     }
 
-    /// The number of complete rounds: registers are new when it changed.
+    /// The number of complete rounds. When it changes, the registers are new.
     #[must_use]
     pub const fn rounds(&self) -> u64 {
         self.rounds
     }
 
-    /// Were all registers read by requests that were sent after this write? Then they show it.
+    /// Were all registers read by requests that were queued after this write? Then they show its effect.
     #[must_use]
     pub fn was_read_since(&self, write: Instant) -> bool {
         self.rounds > 0 && self.read_since > write
@@ -104,7 +106,7 @@ impl Client {
         &self.registers
     }
 
-    /// What the registers say of the arm.
+    /// The state of the arm, decoded from the last known registers.
     #[must_use]
     pub fn state(&self) -> ArmState {
         ArmState::new(&self.registers)
@@ -116,13 +118,13 @@ impl Client {
         self.stop.progress()
     }
 
-    /// Writes, and frames that were not asked for, oldest first.
+    /// The last writes and unsolicited frames, oldest first.
     pub fn frames(&self) -> impl DoubleEndedIterator<Item = &ShownFrame> {
         self.frames.iter()
     }
 
-    /// Writes registers from `address` on. Returns the time of the write, for [`Self::was_read_since`]. What a stop has found out
-    /// is no longer news.
+    /// Queues a write of registers from `address` on. Returns the time of the write, for [`Self::was_read_since`]. Resets the
+    /// result of a completed stop, because the arm may move again.
     pub fn write(&mut self, now: Instant, address: u8, values: &[u8]) -> Instant {
         self.stop.forget();
         self.show(now, true, Traffic::Write { address, values: values.to_vec() });
@@ -135,22 +137,23 @@ impl Client {
         self.last_time
     }
 
-    /// Lets every joint hold where it is: before all that waits to be sent, and again until the arm confirms it.
-    /// [`Client::stop_progress`] tells whether it did. `speeds` are those to restore, if the registers hold others for a while.
+    /// Makes every joint hold where it is. The frames are sent before all other queued frames, and repeated until the arm
+    /// confirms them: see [`Client::stop_progress`]. `speeds` are the speeds to restore, if those in the registers are temporary.
     pub fn stop(&mut self, now: Instant, speeds: Option<[u8; 7]>) {
         self.stop.start(Some(&self.registers).filter(|_| self.rounds > 0), speeds);
         self.continue_stop(now);
     }
 
-    /// Lets every joint hold where it was read last, with these speeds. Nothing confirms it, so that other targets can follow at
-    /// once.
+    /// Makes every joint hold at its last known position, and sets these speeds. The arm does not confirm it, so that other
+    /// targets can follow at once.
     pub fn hold(&mut self, now: Instant, speeds: [u8; 7]) {
         for (address, values) in hold_frames(&self.registers, speeds) {
             self.write(now, address, &values);
         }
     }
 
-    /// As [`Self::hold`], before all that waits to be sent. Returns the last bytes for the arm: its line is closed behind them.
+    /// As [`Self::hold`], but before all other queued frames. Returns the last bytes for the arm: the caller closes the line
+    /// after them.
     pub fn hold_and_leave(&mut self, now: Instant, speeds: [u8; 7]) -> Vec<u8> {
         for (address, values) in hold_frames(&self.registers, speeds) {
             self.link.write_ahead(Map::V22, address, &values);
@@ -159,13 +162,13 @@ impl Client {
         std::mem::take(&mut self.to_send)
     }
 
-    /// Takes bytes of the arm; none if its line is silent at `now`.
+    /// Takes the bytes that the arm has sent. Call it also without bytes, so that timeouts are noticed.
     pub fn receive(&mut self, now: Instant, bytes: &[u8]) {
         self.link.bytes(now, bytes);
         self.advance(now);
     }
 
-    /// Takes what has happened on the link.
+    /// Handles all pending events of the link.
     fn advance(&mut self, now: Instant) {
         loop {
             match self.link.poll(now) {
@@ -211,7 +214,7 @@ impl Client {
         }
     }
 
-    /// Begins a new round of reads if the last one is over. Returns the bytes for the arm.
+    /// Begins a new round of reads if the last one is over. Returns the bytes to send to the arm.
     pub fn poll(&mut self, now: Instant) -> Vec<u8> {
         self.advance(now);
         self.continue_stop(now);

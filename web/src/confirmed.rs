@@ -1,17 +1,17 @@
-//! Frames that the arm has to take before a movement goes on.
+//! Writes that the arm has to confirm before a movement goes on.
 
 use protocol_core::time::Instant;
 
 use crate::client::Client;
 
-/// Registers are written this many times before their loss is an error.
+/// The number of attempts to write registers before a mismatch is an error.
 const ATTEMPTS: u32 = 5;
 
-/// The arm did not take the frames, however often they were written.
+/// The registers did not have the written values after the last attempt.
 #[derive(Debug)]
 pub(crate) struct NotTaken;
 
-/// Frames that are written again until registers that were read afterwards hold their values.
+/// Writes that are repeated until a later read shows their values.
 #[derive(Debug)]
 pub(crate) struct Confirmed {
     frames: Vec<(u8, Vec<u8>)>,
@@ -26,7 +26,8 @@ impl Confirmed {
         Self { frames, written, attempts: 1 }
     }
 
-    /// Has the arm taken them? `Ok(false)`: not known yet.
+    /// Returns `Ok(true)` when the registers have the written values, and `Ok(false)` while it is not known yet. Writes them
+    /// again if they differ.
     pub(crate) fn poll(&mut self, now: Instant, client: &mut Client) -> Result<bool, NotTaken> {
         if !client.was_read_since(self.written) {
             return Ok(false);

@@ -1,4 +1,4 @@
-//! What the arm measures, for an exercise.
+//! Connects an exercise with the arm: makes its observations, and sets up the simulated arm.
 
 use arm_sim::Action;
 use arm_sim::scene::Scene;
@@ -12,7 +12,7 @@ use crate::arm_state::ArmState;
 use crate::source::simulator::SimulatedSource;
 use crate::stop::since_start;
 
-/// What these registers of the arm say at `now`, and what is in its room.
+/// Makes an observation from the registers at `now` and, for a simulated arm, from the things in its room.
 #[must_use]
 pub fn observation(now: Instant, registers: &Snapshot, world: Option<&World>) -> Observation {
     let state = ArmState::new(registers);
@@ -25,7 +25,7 @@ pub fn observation(now: Instant, registers: &Snapshot, world: Option<&World>) ->
     }
 }
 
-/// Does the actions of an exercise to an arm on an empty table, without the obstacles and faults of the exercise before.
+/// Sets up a simulated arm for an exercise: removes all obstacles, faults and things, then carries out the exercise's actions.
 pub fn set_up(arm: &mut SimulatedSource, setup: Vec<Action>) {
     let empty = [Action::Clear(None), Action::Drop, Action::Scene(Some(Scene::default()))];
     empty.into_iter().chain(setup).for_each(|action| arm.act(action));
@@ -46,7 +46,7 @@ mod tests {
     use crate::program::ProgramProgress;
     use crate::tab::Tab;
 
-    /// Runs the solution of an exercise, and says what each part of it came to.
+    /// Runs the solution of an exercise. Returns how each of its programs ended.
     fn solve(tab: &mut Tab, attempt: &mut Attempt, parts: &[SolutionPart]) -> Vec<ProgramProgress> {
         let mut ends = Vec::new();
         for part in parts {
@@ -57,7 +57,7 @@ mod tests {
                         attempt.observe(&tab.observation());
                     };
                     ends.push(tab.run(program, watch).0);
-                    // The hold after a failed program is confirmed.
+                    // Enough time to confirm the hold after a failed program.
                     tab.pass(60);
                 }
             }

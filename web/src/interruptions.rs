@@ -1,6 +1,6 @@
-//! What ends a movement of the page although the arm is well: a stop of another program, and a pause of the page.
+//! Detects interruptions that end a movement although the arm has no fault: a stop by another program, and a pause of the page.
 //!
-//! It reads the count of stops in the registers of a server. The shell of each movement says when.
+//! A server counts the stops in its registers. Parks and programs decide when to check.
 
 use std::time::Duration;
 
@@ -11,29 +11,30 @@ use sevenbot::Snapshot;
 use crate::movement::PlayFailure;
 use crate::stop::since_start;
 
-/// After a longer pause of the page a movement is over: a person may rely on an arm that has stopped.
+/// A longer pause of the page ends a movement: the arm has stopped meanwhile, and a person may rely on that.
 const LONGEST_PAUSE: Duration = Duration::from_secs(1);
-/// The reads of the present round may be older than a write, those of the next one are not.
+/// After a write, wait until this many rounds are complete: the reads of the current round may be older than the write, those of
+/// the next one are not.
 pub(crate) const ROUNDS_TO_KNOW: u64 = 2;
 
-/// Watches for interruptions from the start of a movement on.
+/// Watches for interruptions of one movement.
 #[derive(Debug, Default)]
 pub(crate) struct Interruptions {
     last_poll: Option<Instant>,
-    /// The stops of all programs before the movement, as a server counts them; the inner `None` without a server.
+    /// The server's count of stops at the first check; `None` before it, `Some(None)` without a server.
     stops: Option<Option<u8>>,
 }
 
 impl Interruptions {
-    /// Fails if the page did not call this for too long.
+    /// Fails if the last call was more than [`LONGEST_PAUSE`] ago.
     pub(crate) fn check_pause(&mut self, now: Instant) -> Result<(), PlayFailure> {
         let last = self.last_poll.replace(now).unwrap_or(now);
         let pause = since_start(now).saturating_sub(since_start(last));
         if pause > LONGEST_PAUSE { Err(PlayFailure::Paused(pause)) } else { Ok(()) }
     }
 
-    /// Fails if another program has stopped the arm since the first call. A server drops the targets of a program that streamed; one
-    /// that waits for its joints sees the count of stops.
+    /// Fails if another program has stopped the arm since the first call. The server reports that it drops the targets of this
+    /// client (`is_stopped`), or its count of stops has changed.
     pub(crate) fn check_stops(&mut self, registers: &Snapshot) -> Result<(), PlayFailure> {
         let sharing = SharingState::of(registers);
         let stops = sharing.map(|sharing| sharing.stops);

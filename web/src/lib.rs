@@ -9,7 +9,7 @@
 //!        └── commands ◀── events of a person
 //! ```
 //!
-//! All but `app`, the renderer and the sources of a browser is plain Rust, and is tested on the host.
+//! Everything except `app`, the renderer and the sources that need a browser is plain Rust, and is tested on the host.
 
 #![forbid(unsafe_code)]
 

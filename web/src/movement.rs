@@ -1,4 +1,4 @@
-//! Plays recordings: the shell of the page round [`MovementRun`] and [`MoveWatch`].
+//! Plays recordings: the page's shell around [`MovementRun`] and [`MoveWatch`].
 //!
 //! ```text
 //!   Player: open the stream ──▶ way to the first pose ──▶ the movement ──▶ close the stream ──▶ PlayProgress
@@ -23,46 +23,46 @@ use crate::client::{BAUD, Client};
 use crate::confirmed::{Confirmed, NotTaken, write_all};
 use crate::stop::since_start;
 
-/// Time between two points of a played movement, in milliseconds. A browser calls the page each 17 ms, and the arm smooths 40 % of
-/// jitter (D23).
+/// Time between two points of a played movement, in milliseconds. A browser calls the page every 17 ms. So the points deviate
+/// from an even grid by less than the quarter of a period that D23 allows.
 const PERIOD_MS: u16 = 50;
 const PERIOD: Duration = Duration::from_millis(50);
-/// The arm holds if the page is silent for this long while it plays: 500 ms, in units of 10 ms (D24).
+/// The host-link watchdog: the arm holds if the page sends nothing for 500 ms while it plays. In units of 10 ms (D24).
 const WATCHDOG: u8 = 50;
-/// After a movement the joints have this time to settle.
+/// The joints have this time to settle at the last pose of a movement.
 const SETTLE_TIME: Duration = Duration::from_secs(2);
 pub(crate) const ALL_JOINTS: u8 = 0x7F;
 
-/// Why a movement is not played.
+/// Why a movement cannot be played.
 #[derive(Clone, Debug, PartialEq)]
 pub enum PlayRefusal {
     /// The text is no recording, or the arm cannot follow it.
     NoRecording(RecordingError),
-    /// It begins too far from where the arm stands.
+    /// Its first pose is too far from the present pose of the arm.
     TooFar(StartTooFar),
 }
 
-/// How a movement goes on or has ended.
+/// The progress of a movement.
 #[derive(Clone, Debug, PartialEq)]
 pub enum PlayProgress {
-    /// It goes on.
+    /// The movement is not over yet.
     Playing,
     /// The arm is at its last pose.
     Played,
-    /// It has ended before, for this reason.
+    /// The movement ended early, for this reason.
     Failed(PlayFailure),
 }
 
 /// Why a movement ends early.
 #[derive(Clone, Debug, PartialEq)]
 pub enum PlayFailure {
-    /// The arm does not carry it out.
+    /// The arm reports a problem, is not driven, or does not answer.
     Arm(MoveFault),
-    /// The page did not run for this time, and the arm has stopped.
+    /// The page did not run for this time, and the arm has stopped meanwhile.
     Paused(Duration),
-    /// The arm does not take the registers of a stream.
+    /// The arm does not take written registers.
     NotTaken,
-    /// These joints have settled away from the last pose: joint, position and target in degrees.
+    /// These joints have not reached the last pose: joint, position and target in degrees.
     NotReached(Vec<(Joint, u8, u8)>),
     /// Another program has stopped the arm.
     StoppedByAnother,
@@ -74,7 +74,8 @@ impl From<NotTaken> for PlayFailure {
     }
 }
 
-/// A stop of another program, before a person wanted this movement or program, does not concern it.
+/// Tells a server that a new movement or program begins, so that an earlier stop by another program does not end it. Writes
+/// nothing without a server.
 pub(crate) fn start_anew(now: Instant, client: &mut Client) {
     if SharingState::of(client.registers()).is_some() {
         let (address, values) = Command::StartAnew.write();
@@ -82,7 +83,7 @@ pub(crate) fn start_anew(now: Instant, client: &mut Client) {
     }
 }
 
-/// What a player does.
+/// The stages of a player, in their order.
 #[derive(Debug)]
 enum Stage {
     Start,
@@ -97,28 +98,29 @@ enum Stage {
 #[derive(Debug)]
 pub struct Player {
     recording: Recording,
-    /// The way to the first moment.
+    /// The path to the first moment.
     approach: Approach,
-    /// A stop of another program before it does not concern it.
+    /// An earlier stop by another program does not end this movement: see [`start_anew`].
     starts_anew: bool,
     is_fine: bool,
-    /// The registers before it: speeds and times.
+    /// The registers before the movement, with the speeds and times to restore.
     before: Snapshot,
     watch: MoveWatch,
-    /// The last registers that were watched are those of this round.
+    /// The round of the last registers that were checked.
     watched_round: u64,
-    /// A fault that may be the trace of a stop of another program, whose writes come one after the other.
+    /// A fault that a stop by another program may have caused: the arm may show its effect a round before the server reports it.
     suspected: Option<MoveFault>,
     stage: Stage,
 }
 
 impl Player {
-    /// Parses a recording, to be played from now on by the arm with these registers. With `approach` the arm goes to the
-    /// first pose in this time, or longer if a joint would exceed its speed.
+    /// Parses a recording, to be played from now on by the arm with these registers. With `approach`, the arm goes to the first
+    /// pose in this time, or longer if a joint would exceed its speed.
     ///
     /// # Errors
-    /// The text is no recording, or a joint cannot follow it; or without `approach` the first pose is further than 5 degrees from
-    /// where a joint stands.
+    /// - The text is no recording.
+    /// - A joint cannot follow the recording at its speed.
+    /// - Without `approach`: a joint is more than 5 degrees from the first pose.
     pub fn new(
         text: &str,
         registers: &Snapshot,
@@ -131,7 +133,7 @@ impl Player {
         Ok(Self { starts_anew: true, ..player })
     }
 
-    /// Plays a part of a program: as [`Self::new`], but a stop of another program ends it also before its first point.
+    /// As [`Self::new`], for a part of a program: also a stop by another program before the first point ends it.
     ///
     /// # Errors
     /// As [`Self::new`].
@@ -159,13 +161,13 @@ impl Player {
         })
     }
 
-    /// Restores the speeds and times of these registers at the end.
+    /// Sets the registers whose speeds and times are restored at the end.
     #[must_use]
     pub fn restoring(self, before: Snapshot) -> Self {
         Self { before, ..self }
     }
 
-    /// How much was played, from 0 to 1.
+    /// The part of the movement that was played, from 0 to 1.
     #[must_use]
     pub fn progress(&self) -> f64 {
         match &self.stage {
@@ -179,19 +181,19 @@ impl Player {
         }
     }
 
-    /// The registers before it.
+    /// The registers before the movement.
     #[must_use]
     pub fn into_before(self) -> Snapshot {
         self.before
     }
 
-    /// The speeds of the joints before it.
+    /// The speeds of the joints before the movement, as in registers 32 to 38.
     #[must_use]
     pub fn speeds(&self) -> [u8; 7] {
         self.before.joints(&SPEED)
     }
 
-    /// Writes what is due: of the way to the first pose, then of the movement.
+    /// Writes the points that are due. Call it with each picture.
     pub fn poll(&mut self, now: Instant, client: &mut Client) -> PlayProgress {
         match self.advance(now, client) {
             Ok(progress) => progress,
@@ -202,14 +204,15 @@ impl Player {
         }
     }
 
-    /// Ends the stream of a movement that a stop has ended. The stop restores the speeds.
+    /// Ends the stream after a stop. The stop itself restores the speeds.
     pub fn end_stream(&self, now: Instant, client: &mut Client) {
         if self.is_fine && !matches!(self.stage, Stage::Start | Stage::Settling(_)) {
             client.write(now, SET_POINT_PERIOD.address, &[0; 4]);
         }
     }
 
-    /// Later targets are approached by speed again. The arm stops at its last point, which is at most 50 ms ahead.
+    /// Ends the movement early: closes the stream, and restores speeds and times. The arm stops at the last point that was sent,
+    /// at most 50 ms ahead.
     pub fn end(&self, now: Instant, client: &mut Client) {
         if !matches!(self.stage, Stage::Start | Stage::Settling(_)) {
             write_all(&self.closing_frames(), now, client);
@@ -253,7 +256,7 @@ impl Player {
         Ok(PlayProgress::Playing)
     }
 
-    /// Fails if the arm does not carry out the movement.
+    /// Fails if the arm does not carry out the movement, or another program has stopped it.
     fn watch(&mut self, now: Instant, client: &Client) -> Result<(), PlayFailure> {
         if client.rounds() != self.watched_round {
             self.watched_round = client.rounds();
@@ -269,7 +272,7 @@ impl Player {
                 seen => seen.map_err(PlayFailure::Arm)?,
             }
         }
-        // The rounds of reads answer the questions.
+        // Fails if the arm is silent. The client reads all registers in any case, so the span to read is not needed.
         self.watch.question(since_start(now)).map(drop).map_err(PlayFailure::Arm)
     }
 
@@ -302,7 +305,7 @@ impl Player {
         MovementRun::in_steps(way, now)
     }
 
-    /// The movement. Its points tell the speed.
+    /// The run of the movement. Its points determine the speed, so the speed registers are set to the maximum.
     fn path(&self, now: Instant, client: &mut Client) -> MovementRun {
         if !self.is_fine {
             return MovementRun::in_steps(playback::steps(&self.recording, 1.0), since_start(now));

@@ -1,11 +1,11 @@
-//! Parks the arm: goes to a pose in which friction holds it, switches the motors to damping, and watches whether it stays.
+//! Parks the arm: moves it to a pose in which friction holds it, switches the motors to damping, and checks that it stays there.
 //!
 //! ```text
 //!   Park: two rounds of reads ──▶ the way, pose by pose ──▶ let go ──▶ ParkProgress
 //!             └── motors off, a problem, a stop or a pause: ParkFailure, and the arm holds ──┘
 //! ```
 //!
-//! The way there, its speed and the time of the watch are those of `sevenbot park`.
+//! The path, its speed and the time to check are the same as for `sevenbot park`.
 
 use protocol_core::time::{Duration, Instant};
 use sevenbot::fine::FineTargets;
@@ -20,36 +20,36 @@ use crate::interruptions::{Interruptions, ROUNDS_TO_KNOW};
 use crate::movement::{ALL_JOINTS, PlayFailure, start_anew};
 use crate::stop::since_start;
 
-/// 19 degrees per second.
+/// The speed of the path, in steps of 1.9 degrees per second: 19 degrees per second.
 const SPEED_STEPS: u8 = 10;
-/// A joint this near to its target has arrived, in degrees.
+/// A joint has arrived if its distance from its target is at most this, in degrees.
 const ARRIVED: f32 = 3.0;
-/// A joint that moves by more than this after it was let go does not stay, in degrees.
+/// A joint that moves by more than this after it was let go has sunk, in degrees.
 const STAYS: f32 = 2.0;
-/// Time for each part of the way: 180 degrees take 10 s.
+/// The longest time for each part of the path. A turn of 180 degrees takes 10 s.
 const LONGEST_MOVE: Duration = Duration::from_micros(20_000_000);
-/// The arm is watched for this time after it was let go.
+/// The arm has to stay in its pose for this time after it was let go.
 const WATCH_TIME: Duration = Duration::from_micros(2_000_000);
 
-/// How parking goes on or has ended.
+/// The progress of a park.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ParkProgress {
-    /// It goes on.
+    /// The park is not over yet.
     Moving,
     /// The arm is parked.
     Parked,
-    /// It has ended before, for this reason.
+    /// The park has failed, for this reason.
     Failed(ParkFailure),
 }
 
 /// Why the arm is not parked.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ParkFailure {
-    /// A joint is not measured yet. Nothing has moved.
+    /// A joint was not measured since power-up. The arm was not moved.
     NotMeasured,
-    /// The arm did not stay where it was let go. Its motors drive it again.
+    /// The arm sank after it was let go. Its motors drive it again.
     Sank,
-    /// The arm did not get there.
+    /// The arm did not reach the pose.
     Move(PlayFailure),
 }
 
@@ -68,28 +68,28 @@ impl From<MoveFault> for ParkFailure {
 #[derive(Debug)]
 enum Stage {
     Start,
-    /// It begins when this round was read.
+    /// Waits until this round of reads is complete.
     Beginning(u64),
-    /// What is left of the way, the next part last. When that was sent, and how many complete rounds of reads there were then.
+    /// The remaining parts of the path, the current one last, and the time and round of reads at which it was sent.
     Way(Vec<FineTargets>, Option<(Instant, u64)>),
-    /// The angles and the time at which the arm was let go.
+    /// The angles in degrees and the time at which the arm was let go.
     LetGo([f32; 7], Instant),
 }
 
 /// A park in progress.
 #[derive(Debug)]
 pub struct Park {
-    /// The registers before it: speeds.
+    /// The registers before the park, with the speeds to restore.
     before: Snapshot,
     stage: Stage,
     interruptions: Interruptions,
     watch: MoveWatch,
-    /// The last registers that were watched are those of this round.
+    /// The round of the last registers that were checked.
     watched_round: u64,
 }
 
 impl Park {
-    /// Begins. `before`: the registers with the speeds that the arm has afterwards.
+    /// Begins a park. `before` are the registers with the speeds to restore afterwards.
     #[must_use]
     pub fn new(before: Snapshot, now: Instant) -> Self {
         Self {
@@ -101,32 +101,32 @@ impl Park {
         }
     }
 
-    /// The speeds before it.
+    /// The speeds of the joints before the park, as in registers 32 to 38.
     #[must_use]
     pub fn speeds(&self) -> [u8; 7] {
         self.before.joints(&SPEED)
     }
 
-    /// The registers before it.
+    /// The registers before the park.
     #[must_use]
     pub fn into_before(self) -> Snapshot {
         self.before
     }
 
-    /// Ends it, because something else moves the arm now. Joints that are on their way hold.
+    /// Ends the park early, because something else is about to move the arm. Moving joints hold.
     pub fn end(&self, now: Instant, client: &mut Client) {
         if matches!(self.stage, Stage::Way(..)) {
             client.hold(now, self.speeds());
         }
     }
 
-    /// Writes what is due.
+    /// Writes the frames that are due. Call it with each picture.
     pub fn poll(&mut self, now: Instant, client: &mut Client) -> ParkProgress {
         match self.advance(now, client) {
             Ok(progress) => progress,
             Err(failure) => {
                 match (&self.stage, &failure) {
-                    // The arm holds then, and does not take a stop of this program.
+                    // The arm holds already, and the server drops targets of this client, so a stop could not be confirmed.
                     (Stage::Way(..), ParkFailure::Move(PlayFailure::StoppedByAnother)) => {
                         client.write(now, SPEED.address, &self.speeds());
                     }
@@ -162,7 +162,7 @@ impl Park {
                     *sent = Some((now, client.rounds()));
                 }
                 (Some((at, rounds)), Some(targets)) => {
-                    // The next round may have been on its way before these targets.
+                    // The reads of the current round may be older than these targets.
                     if client.rounds() >= rounds + ROUNDS_TO_KNOW && has_arrived(&state, targets) {
                         way.pop();
                         *sent = None;
@@ -182,10 +182,10 @@ impl Park {
         Ok(ParkProgress::Moving)
     }
 
-    /// Fails if the arm does not move as it should, or something interrupts it.
+    /// Fails if the arm does not move as it should, or something interrupts the park.
     fn check(&mut self, now: Instant, client: &Client) -> Result<(), ParkFailure> {
         self.interruptions.check_pause(now)?;
-        // The rounds of reads answer the questions.
+        // Fails if the arm is silent. The client reads all registers in any case, so the span to read is not needed.
         self.watch.question(since_start(now))?;
         let is_known = !matches!(self.stage, Stage::Beginning(round) if client.rounds() < round);
         if is_known && client.rounds() != self.watched_round {
@@ -197,7 +197,7 @@ impl Park {
     }
 }
 
-/// From where the joints are to the pose, in reverse.
+/// The path from the measured positions to the park pose, in reverse order.
 fn way(state: &ArmState) -> Result<Vec<FineTargets>, ParkFailure> {
     let angle = |degrees: f32| FineAngle::from_degrees(f64::from(degrees));
     let mut here = [FineAngle::from_hundredths(0).ok_or(ParkFailure::NotMeasured)?; 7];
@@ -247,7 +247,7 @@ mod tests {
     use crate::texts::Language;
     use crate::words::park_failure;
 
-    /// Parks until the end. `during` gets the number of each picture, and may break something.
+    /// Runs a park to its end. Calls `during` before each picture with its number, for example to inject a fault.
     fn park(tab: &mut Tab, mut during: impl FnMut(u32, &mut Tab)) -> ParkProgress {
         let mut park = Park::new(tab.client.registers().clone(), tab.now());
         for picture in 0..4_000 {

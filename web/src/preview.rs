@@ -1,5 +1,5 @@
-//! Tries a program of blocks on a simulated arm of its own, as fast as the processor allows, and keeps its way as a
-//! [`TimeLine`]. The arm of the page is not touched.
+//! Runs a program of blocks on a separate simulated arm, as fast as the processor allows, and records its path as a
+//! [`TimeLine`]. The page's own arm is not affected.
 
 use block_programs::Program;
 use protocol_core::time::Instant;
@@ -14,31 +14,31 @@ use crate::source::simulator::SimulatedSource;
 use crate::stop::since_start;
 use crate::time_line::{Stand, TimeLine};
 
-/// Program and simulated arm take turns after this virtual time, in microseconds.
+/// The program is polled at this interval of virtual time, in microseconds.
 const STEP_MICROS: f64 = 20_000.0;
-/// The time line has ten moments a second.
+/// The number of steps between two moments of the time line: ten moments per second.
 const STEPS_BETWEEN_STANDS: u32 = 5;
-/// After five minutes of a program its preview ends.
+/// The longest preview: five minutes of virtual time.
 const MOST_STEPS: u32 = 15_000;
-/// A new arm has engaged its joints after two seconds.
+/// After two seconds a new arm drives its joints.
 const STEPS_TO_START: u32 = 100;
-/// It is in any pose after three more.
+/// After three more seconds it has reached any pose.
 const STEPS_TO_POSE: u32 = 150;
-/// This near to it, in degrees: servos have play, and the claw may hold something.
+/// The largest distance of joints 1 to 6 from that pose, in degrees: servos have play. Joint 7 may hold something.
 const NEAR: f32 = 3.0;
 
-/// How a preview has ended.
+/// The end of a preview.
 #[derive(Clone, Debug, PartialEq)]
 pub enum PreviewEnd {
-    /// The program came to its end.
+    /// The program ran to its end.
     Over,
     /// The program would end early, for this reason.
     Failed(ProgramFailure),
-    /// The program goes on for more than five minutes.
+    /// The program would take more than five minutes.
     TooLong,
 }
 
-/// A program that is tried.
+/// A preview in progress.
 pub struct Preview {
     client: Client,
     arm: SimulatedSource,
@@ -49,11 +49,11 @@ pub struct Preview {
 }
 
 impl Preview {
-    /// Tries a program on a copy of this simulated arm, with its room and its faults.
+    /// Previews a program on a copy of this simulated arm, with its room and its faults.
     #[must_use]
     pub fn on_copy_of(arm: &SimulatedSource, program: &Program) -> Self {
         let (mut client, mut arm) = (Client::default(), arm.clone());
-        // What the arm has sent before is for the page.
+        // Drop the replies to requests of the page.
         drop(arm.receive());
         for _ in 0..STEPS_TO_START {
             if !client.is_connected() {
@@ -63,8 +63,8 @@ impl Preview {
         Self::begin(client, arm, program)
     }
 
-    /// Tries a program on a new simulated arm in the pose and with the speeds of these registers. It stands on an empty table.
-    /// `None` if it does not get into the pose.
+    /// Previews a program on a new simulated arm on an empty table, with the pose, speeds and times of these registers. `None` if
+    /// the simulated arm cannot reach the pose.
     #[must_use]
     pub fn on_new_arm(registers: &Snapshot, program: &Program) -> Option<Self> {
         let (mut client, mut arm) = (Client::default(), SimulatedSource::default());
@@ -91,7 +91,7 @@ impl Preview {
         Self { client, arm, run, begun, steps: 0, time_line: TimeLine::default() }
     }
 
-    /// Goes on with the program while `has_time` says so. Returns how it ended, if it did.
+    /// Runs the program until it ends, or until `has_time` returns false. Returns `None` if it has not ended yet.
     pub fn poll(&mut self, mut has_time: impl FnMut() -> bool) -> Option<PreviewEnd> {
         loop {
             let end = match self.run.poll(self.arm.now(), &mut self.client) {
@@ -114,7 +114,7 @@ impl Preview {
         }
     }
 
-    /// Where the arm has been so far.
+    /// The recorded path of the arm.
     #[must_use]
     pub fn into_time_line(self) -> TimeLine {
         self.time_line
@@ -133,7 +133,7 @@ fn pass(client: &mut Client, arm: &mut SimulatedSource, steps: u32) {
     (0..steps).for_each(|_| exchange(client, arm, STEP_MICROS));
 }
 
-/// Sends what is due, lets this virtual time pass, and takes what the arm has sent.
+/// Exchanges bytes between client and arm while this virtual time passes, in microseconds.
 pub(crate) fn exchange(client: &mut Client, arm: &mut SimulatedSource, micros: f64) {
     arm.send(&client.poll(arm.now()));
     arm.advance(micros, || true);

@@ -1,8 +1,8 @@
-//! The Chinese words for what is wrong with an arm, and what to do.
+//! The problems of an arm and their remedies in Chinese.
 
 use sevenbot::ProblemKind;
 
-/// The translation of the library's words and remedies.
+/// The translation of the library's description of a problem and of its remedy.
 pub(crate) const fn words_and_remedy(kind: ProblemKind) -> (&'static str, &'static str) {
     match kind {
         ProblemKind::Restarted => {

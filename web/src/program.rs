@@ -1,4 +1,4 @@
-//! Runs a program of blocks on the arm: the shell of the page round [`Interpreter`].
+//! Runs a program of blocks on the arm: the page's shell around [`Interpreter`].
 //!
 //! ```text
 //!   Interpreter ── Begin ──▶ the lit block; in single steps the program waits here
@@ -9,8 +9,8 @@
 //!                    ──▶ Player: a straight line
 //! ```
 //!
-//! The program goes on only if the arm has done what the block says. A blocked or silent joint, a stop, or another program that
-//! moves the arm end it.
+//! The program continues after a block only when the arm has carried it out. A blocked or silent joint, a stop, or another
+//! program that moves the arm ends it.
 
 mod command;
 mod failure;
@@ -32,28 +32,28 @@ use crate::interruptions::{Interruptions, ROUNDS_TO_KNOW};
 use crate::movement::{PlayFailure, start_anew};
 use crate::stop::since_start;
 
-/// So many blocks begin in one call at most. An endless loop goes on in the next call.
+/// At most this many blocks begin in one poll. An endless loop continues in the next poll.
 const BLOCKS_PER_POLL: u32 = 200;
 
-/// How a program goes on or has ended.
+/// The progress of a program.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ProgramProgress {
-    /// It goes on.
+    /// The program is not over yet.
     Running,
-    /// It waits before the lit block, for the next step.
+    /// The program waits before the lit block until a person asks for the next step.
     Waiting,
-    /// It has come to its end.
+    /// The program ran to its end.
     Over,
-    /// It has ended before, for this reason.
+    /// The program ended early, for this reason.
     Failed(ProgramFailure),
 }
 
 /// Does the program stop before each block?
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pace {
-    /// No.
+    /// No: it runs without a pause.
     Running,
-    /// Yes.
+    /// Yes: it waits for [`ProgramRun::go_on`] before each block.
     SingleSteps,
 }
 
@@ -62,21 +62,21 @@ pub enum Pace {
 pub struct ProgramRun {
     interpreter: Interpreter,
     pace: Pace,
-    /// It waits before a block, for the next step.
+    /// It waits before a block for [`Self::go_on`].
     is_waiting: bool,
-    /// The block that runs.
+    /// The current block; `None` before the first one.
     block: Option<BlockId>,
     action: Action,
-    /// The registers before it: speeds and times.
+    /// The registers before the program, with the speeds and times to restore.
     before: Snapshot,
     watch: MoveWatch,
-    /// The last registers that were watched are those of this round.
+    /// The round of the last registers that were checked.
     watched_round: u64,
     interruptions: Interruptions,
 }
 
 impl ProgramRun {
-    /// Begins a program on an arm with these registers.
+    /// Begins a program on an arm with these registers. Their speeds and times are restored at the end.
     #[must_use]
     pub fn new(program: &Program, pace: Pace, registers: &Snapshot, now: Instant) -> Self {
         Self {
@@ -92,31 +92,31 @@ impl ProgramRun {
         }
     }
 
-    /// The block that runs, or is the next one.
+    /// The block that runs or, if the program waits, the next one. `None` before the first block.
     #[must_use]
     pub const fn block(&self) -> Option<&BlockId> {
         self.block.as_ref()
     }
 
-    /// Does it wait for the next step?
+    /// Does the program wait before a block?
     #[must_use]
     pub const fn is_waiting(&self) -> bool {
         self.is_waiting
     }
 
-    /// The registers before it. It restores the speeds and times.
+    /// The registers before the program, with the speeds and times that it restores.
     #[must_use]
     pub const fn before(&self) -> &Snapshot {
         &self.before
     }
 
-    /// Does the next block if the program waits, and goes on at this pace.
+    /// Continues at this pace. If the program waits, runs the next block.
     pub const fn go_on(&mut self, pace: Pace) {
         self.pace = pace;
         self.is_waiting = false;
     }
 
-    /// Writes what is due, and runs the blocks that are.
+    /// Runs the blocks that are due, and writes their frames. Call it with each picture.
     pub fn poll(&mut self, now: Instant, client: &mut Client) -> ProgramProgress {
         match self.advance(now, client) {
             Ok(progress) => progress,
@@ -132,8 +132,8 @@ impl ProgramRun {
         self.hold(now, client);
     }
 
-    /// Ends the program, because something else moves the arm now. Joints that are on their way hold: with the speeds of before they
-    /// would go on, and faster (D11).
+    /// Ends the program, because something else is about to move the arm, and restores speeds and times. Moving joints hold:
+    /// otherwise the restored speeds would act on their moves at once (D11).
     pub fn end(self, now: Instant, client: &mut Client) {
         if self.action.may_move() {
             client.hold(now, self.before.joints(&SPEED));
@@ -145,7 +145,7 @@ impl ProgramRun {
     }
 
     fn fail(&self, failure: &ProgramFailure, now: Instant, client: &mut Client) {
-        // The arm holds then, and does not take a stop of this program.
+        // The arm holds already, and the server drops targets of this client, so a stop could not be confirmed.
         let is_stopped = *failure == ProgramFailure::Arm(PlayFailure::StoppedByAnother);
         if self.action.may_move() && !is_stopped {
             self.hold(now, client);
@@ -180,14 +180,14 @@ impl ProgramRun {
         self.run_blocks(now, client)
     }
 
-    /// Fails if the arm does not do what the program wants, or another program has stopped it.
+    /// Fails if the arm has a problem or is silent, or another program has stopped it.
     fn watch(&mut self, now: Instant, client: &Client) -> Result<(), ProgramFailure> {
         if client.rounds() != self.watched_round {
             self.watched_round = client.rounds();
             self.interruptions.check_stops(client.registers()).map_err(ProgramFailure::Arm)?;
             self.watch.registers(since_start(now), client.registers())?;
         }
-        // The rounds of reads answer the questions.
+        // Fails if the arm is silent. The client reads all registers in any case, so the span to read is not needed.
         Ok(self.watch.question(since_start(now)).map(drop)?)
     }
 
@@ -208,7 +208,7 @@ impl ProgramRun {
         Ok(ProgramProgress::Running)
     }
 
-    /// Goes on until a block begins, or the arm has something to do.
+    /// Runs the interpreter until the next block begins, or until a command for the arm or the end of the program.
     fn run_block(&mut self, now: Instant, client: &mut Client) -> Result<(), ProgramFailure> {
         loop {
             match self.interpreter.advance()? {

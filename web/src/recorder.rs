@@ -1,4 +1,4 @@
-//! Records the joints: the shell of the page round [`MoveWatch`] and [`RecordingLines`].
+//! Records the joints: the page's shell around [`MoveWatch`] and [`RecordingLines`].
 
 use protocol_core::time::Instant;
 use sevenbot::approach::Standing;
@@ -9,7 +9,7 @@ use sevenbot::{FineAngle, Snapshot};
 use crate::client::BAUD;
 use crate::stop::since_start;
 
-/// A movement that grows while it is recorded.
+/// A recording in progress.
 #[derive(Debug)]
 pub struct Recorder {
     start: Instant,
@@ -19,7 +19,7 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// A recording that begins now.
+    /// Begins a recording at `now`.
     #[must_use]
     pub fn new(now: Instant) -> Self {
         let lines = RecordingLines::new(FileVersion::Hundredths);
@@ -27,10 +27,10 @@ impl Recorder {
         Self { start: now, text: lines.head(), lines, watch }
     }
 
-    /// Adds the joints of these registers, if all of them are measured and time has passed.
+    /// Adds the pose of these registers. Skips it if a joint is not measured, or if no time has passed since the last one.
     ///
     /// # Errors
-    /// A servo is silent, or the controller restarted: the positions are not those of the arm, and the recording has ended.
+    /// A servo is silent, or the controller restarted: the registers do not hold the true positions, so the recording has to end.
     pub fn add(&mut self, now: Instant, registers: &Snapshot, vacuum: bool) -> Result<(), MoveFault> {
         self.watch.registers(since_start(now), registers)?;
         let measured = Standing::of(registers).measured.map(|angle| FineAngle::from_degrees(angle?));
@@ -44,7 +44,7 @@ impl Recorder {
         Ok(())
     }
 
-    /// The recording as a file; `None` if nothing was measured.
+    /// The text of the file; `None` if no pose was added.
     #[must_use]
     pub fn finish(self) -> Option<String> {
         (self.lines.count() > 0).then_some(self.text)

@@ -1,4 +1,4 @@
-//! A stop of the page: [`Hold`] decides what to write and when, as for `sevenbot stop`. Here are its clock and its news.
+//! A stop of the page: the shell around [`Hold`], which decides what to write and when, as for `sevenbot stop`.
 
 use std::time::Duration;
 
@@ -7,26 +7,26 @@ use sevenbot::Snapshot;
 use sevenbot::hold::{HeldJoints, Hold, HoldStep};
 use sevenbot::map::SPEED;
 
-/// Addresses and their values.
+/// Writes of registers: first address, values.
 type Frames = Vec<(u8, Vec<u8>)>;
 
-/// How far a stop has come.
+/// The progress of a stop.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum StopProgress {
-    /// Nobody asked for one.
+    /// There was no stop, or the arm got another command after it.
     #[default]
     None,
-    /// It was written, and is not confirmed yet.
+    /// The stop was begun, but the arm has not confirmed it yet.
     Verifying,
-    /// The arm has the targets that hold it.
+    /// The arm has confirmed the targets that hold it.
     Holds,
     /// The motors are off: there is nothing to stop.
     NotDriven,
-    /// The arm did not take the targets. It may be moving.
+    /// The arm did not take the targets after several attempts. It may be moving.
     Failed,
 }
 
-/// The last stop.
+/// The last stop, and its progress.
 #[derive(Debug, Default)]
 pub struct Stop {
     progress: StopProgress,
@@ -34,8 +34,8 @@ pub struct Stop {
 }
 
 impl Stop {
-    /// Begins a stop of an arm with these registers; `None` if they were not read yet. `speeds` are those to restore, if
-    /// the registers hold others for a while. A stop that is not confirmed goes on.
+    /// Begins a stop. `registers` are the last known ones; `None` if they were not read yet. `speeds` are the speeds to restore,
+    /// if those in the registers are temporary. Does nothing while another stop is not confirmed yet.
     pub fn start(&mut self, registers: Option<&Snapshot>, speeds: Option<[u8; 7]>) {
         if self.progress == StopProgress::Verifying {
             return;
@@ -45,27 +45,27 @@ impl Stop {
         self.progress = StopProgress::Verifying;
     }
 
-    /// How far the stop has come.
+    /// The progress of the last stop.
     #[must_use]
     pub const fn progress(&self) -> StopProgress {
         self.progress
     }
 
-    /// The arm was told something else: what the stop has found out is no longer news.
+    /// Resets the result of a completed stop, because the arm got another command. A stop in progress continues.
     pub fn forget(&mut self) {
         if self.progress != StopProgress::Verifying {
             self.progress = StopProgress::None;
         }
     }
 
-    /// Takes registers that came at `now`, from reads that were sent at `asked` or later.
+    /// Takes registers that arrived at `now`, from reads that were sent at `asked` or later.
     pub fn registers(&mut self, asked: Instant, now: Instant, registers: &Snapshot) {
         if self.progress == StopProgress::Verifying {
             self.hold.joints(since_start(asked), since_start(now), &HeldJoints::of(registers));
         }
     }
 
-    /// The frames to write now, before everything else.
+    /// The frames to write now, before all other queued frames. Also updates the progress.
     pub fn frames(&mut self, now: Instant) -> Frames {
         if self.progress != StopProgress::Verifying {
             return Vec::new();
@@ -81,17 +81,17 @@ impl Stop {
     }
 }
 
-/// What lets the joints of these registers hold without a confirmation, and then gives them these speeds.
+/// The frames that make the joints hold without a confirmation, and then set these speeds: only the speeds if the motors are off.
 pub(crate) fn hold_frames(registers: &Snapshot, speeds: [u8; 7]) -> Frames {
     let frames = match Hold::at_once(Some(&HeldJoints::of(registers))).poll(Duration::ZERO) {
         HoldStep::Write(frames) => frames,
-        // The motors are off.
+        // The motors are off: no joint has to hold.
         _ => Frames::new(),
     };
     frames.into_iter().chain([(SPEED.address, speeds.to_vec())]).collect()
 }
 
-/// The time since the start of the page's clock.
+/// Converts an instant to the time since the start of its clock.
 #[must_use]
 pub const fn since_start(now: Instant) -> Duration {
     Duration::from_micros(now.as_micros())
@@ -113,7 +113,7 @@ mod tests {
         let (at_end, speeds) = (tab.angles()[0], tab.client.registers().joints(&SPEED));
         let bytes = tab.client.hold_and_leave(tab.now(), speeds);
         tab.arm.send(&bytes);
-        // Nobody reads the line.
+        // The page has left: it discards the replies.
         (0..200).for_each(|_| tab.arm.advance(10_000.0, || true));
         let left = tab.angles()[0];
         assert!(at_end < 140.0 && (at_end - left).abs() < 10.0, "from {at_end} to {left}");

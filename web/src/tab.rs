@@ -1,4 +1,4 @@
-//! A page and its simulated arm, for tests: a picture each 1/60 s of virtual time.
+//! A page and its simulated arm for tests, in virtual time.
 
 use block_programs::Program;
 use exercises::Observation;
@@ -12,7 +12,7 @@ use crate::preview::exchange;
 use crate::program::{Pace, ProgramProgress, ProgramRun};
 use crate::source::simulator::SimulatedSource;
 
-/// A picture of the page is shown each 1/60 s.
+/// The virtual time between two pictures of the page, in microseconds: 1/60 s.
 const PICTURE_MICROS: f64 = 16_667.0;
 
 /// A page and its simulated arm.
@@ -22,7 +22,7 @@ pub(crate) struct Tab {
 }
 
 impl Tab {
-    /// An arm that was switched on a second ago.
+    /// A page with an arm that was switched on 100 pictures, 1.7 s, ago.
     pub(crate) fn new() -> Self {
         let mut tab = Self { client: Client::default(), arm: SimulatedSource::default() };
         tab.pass(100);
@@ -30,7 +30,7 @@ impl Tab {
         tab
     }
 
-    /// As the page does for each picture.
+    /// Exchanges bytes with the arm for this number of pictures, as the page does.
     pub(crate) fn pass(&mut self, pictures: u32) {
         (0..pictures).for_each(|_| exchange(&mut self.client, &mut self.arm, PICTURE_MICROS));
     }
@@ -39,7 +39,7 @@ impl Tab {
         self.arm.now()
     }
 
-    /// What an exercise sees.
+    /// The observation for an exercise.
     pub(crate) fn observation(&self) -> Observation {
         observation(self.now(), self.client.registers(), self.arm.simulation().plant().world())
     }
@@ -53,7 +53,7 @@ impl Tab {
         ProgramRun::new(&program, pace, self.client.registers(), self.now())
     }
 
-    /// Runs a program to its end. `during` gets the number of each picture, and may break something.
+    /// Runs a program to its end. Calls `during` before each picture with its number, for example to inject a fault.
     pub(crate) fn run(
         &mut self,
         workspace: &str,
@@ -75,6 +75,7 @@ impl Tab {
         Joint::ALL.map(|joint| f64::from(self.arm.simulation().plant().angle(joint)) / 1e3)
     }
 
+    /// The registers that a program or park has to restore: speeds and times.
     pub(crate) fn registers(&self) -> Vec<u8> {
         [SPEED, TIME].iter().flat_map(|row| self.client.registers().joints(row)).collect()
     }

@@ -1,4 +1,4 @@
-//! Every text of the page, in English and Chinese. The English words for what is wrong, and what to do, are those of the library.
+//! Every text of the page, in English and Chinese. The English texts for problems and their remedies come from the library.
 
 use sevenbot::Problem;
 
@@ -15,13 +15,13 @@ pub enum Language {
 }
 
 impl Language {
-    /// The language for a tag of the browser, such as `zh-CN`.
+    /// The language for a language tag of the browser, such as `zh-CN`. English for every tag that does not begin with `zh`.
     #[must_use]
     pub fn of_tag(tag: &str) -> Self {
         if tag.starts_with("zh") { Self::Chinese } else { Self::English }
     }
 
-    /// The tag of the language.
+    /// The language tag: `en` or `zh-CN`.
     #[must_use]
     pub const fn tag(self) -> &'static str {
         match self {
@@ -39,13 +39,13 @@ impl Language {
         }
     }
 
-    /// A text; its name if there is no such text.
+    /// The text with this name; the name itself if there is no such text.
     #[must_use]
     pub fn text(self, name: &'static str) -> &'static str {
         self.find(name).unwrap_or(name)
     }
 
-    /// A text that the page names; `None` if there is no such text.
+    /// The text with this name; `None` if there is no such text.
     #[must_use]
     pub fn find(self, name: &str) -> Option<&'static str> {
         let (_, english, chinese) = TEXTS.iter().find(|(known, ..)| *known == name)?;
@@ -54,7 +54,7 @@ impl Language {
 }
 
 impl Language {
-    /// What is wrong, and what to do.
+    /// The description of a problem and its remedy, in whole sentences.
     #[must_use]
     pub fn problem(self, problem: Problem) -> String {
         if self == Self::English {
@@ -70,7 +70,7 @@ impl Language {
     }
 }
 
-/// Names, English, Chinese.
+/// Each text by its name: English, Chinese.
 const TEXTS: &[(&str, &str, &str)] = &[
     ("source", "Arm", "机械臂"),
     ("source-simulator", "simulated in this page", "本页面内模拟"),

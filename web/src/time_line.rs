@@ -1,4 +1,4 @@
-//! A movement as a time line: where the arm is at each moment of it, and which block of a program moves it there.
+//! A movement as a time line: the pose of the arm at each moment, and the block of the program that runs then.
 
 use std::time::Duration;
 
@@ -8,23 +8,23 @@ use sevenbot::recording::{Moment, Recording};
 /// The arm at one moment.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stand {
-    /// Since the movement began.
+    /// The time since the movement began.
     pub time: Duration,
     /// Angles of joints 1 to 7, in degrees.
     pub angles: [f32; 7],
-    /// The block of a program that runs then.
+    /// The block of the program that runs at this moment; `None` for a recording, and before the first block.
     pub block: Option<BlockId>,
 }
 
-/// A movement that can be looked through.
+/// A movement that a person can browse.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TimeLine {
-    /// In their order in time.
+    /// Ordered by time.
     stands: Vec<Stand>,
 }
 
 impl TimeLine {
-    /// The movement of a recording.
+    /// Converts a recording.
     #[must_use]
     pub fn of(recording: &Recording) -> Self {
         let stand = |Moment { time, pose, .. }: Moment| Stand {
@@ -35,7 +35,7 @@ impl TimeLine {
         Self { stands: recording.moments().map(stand).collect() }
     }
 
-    /// Adds the arm at a later moment than all before.
+    /// Adds a moment, which has to be later than all earlier ones.
     pub fn push(&mut self, stand: Stand) {
         self.stands.push(stand);
     }
@@ -46,7 +46,8 @@ impl TimeLine {
         self.stands.last().map_or(Duration::ZERO, |last| last.time)
     }
 
-    /// The arm at `time`: between two moments on the straight way between them. `None` for a movement without moments.
+    /// The arm at `time`, linearly interpolated between two moments. Before the first and after the last moment, the arm stands.
+    /// `None` for a time line without moments.
     #[must_use]
     pub fn at(&self, time: Duration) -> Option<Stand> {
         let next = self.stands.partition_point(|stand| stand.time <= time);

@@ -1,4 +1,4 @@
-//! What the page says of the arm, in one line.
+//! The line that describes the state of the arm, and the messages for failures, in the language of the page.
 
 use block_programs::ProgramFault;
 use sevenbot::health::MoveFault;
@@ -12,22 +12,22 @@ use crate::program::ProgramFailure;
 use crate::stop::StopProgress;
 use crate::texts::Language;
 
-/// So many problems are told at a time: the line is short.
+/// At most this many problems are shown at the same time, because the line is short.
 const PROBLEMS_SHOWN: usize = 2;
 
-/// Is the news good, bad or neither?
+/// The colour of the line: is its message good, bad or neutral?
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mood {
     /// All is well.
     Good,
-    /// A person should act.
+    /// A person has to act.
     Bad,
-    /// Neither.
+    /// Neutral: nothing is wrong, but the arm is not ready.
     Plain,
 }
 
 impl Mood {
-    /// The class of the line on the page.
+    /// The CSS class of the line.
     #[must_use]
     pub const fn class(self) -> &'static str {
         match self {
@@ -41,17 +41,18 @@ impl Mood {
 /// Does an arm answer?
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Answers {
-    /// Not yet.
+    /// It has not answered yet.
     NotYet,
-    /// It does.
+    /// It answers.
     Yes,
-    /// It did.
+    /// It answered before, but does not answer now.
     NoLonger,
-    /// The line to it has ended.
+    /// The connection to it is closed.
     LineEnded,
 }
 
-/// The line, and its mood: the most important thing first. `doing` is the name of the text of what the page does with the arm.
+/// The line for a state of the arm, and its mood. If several facts apply, the most important one wins. `doing` is the name of the
+/// text that describes what the page does with the arm; `None` if it does nothing.
 #[must_use]
 pub fn state_line(
     language: Language,
@@ -73,11 +74,11 @@ pub fn state_line(
         _ => {}
     }
     let stalled = || format!("{} {}", language.text("stalled"), joints(state.stalled));
-    // A joint that rests away from its target tells more than the fault of an unknown servo.
+    // A joint that rests away from its target is more precise than a fault bit without a joint.
     match state.problems.first() {
         Some(problem) if problem.kind < ProblemKind::ServoBus || state.stalled == 0 => {
             let texts = state.problems.iter().take(PROBLEMS_SHOWN).map(|&problem| language.problem(problem));
-            // Some problems stay until a restart. They do not hide whether a stop has reached the arm.
+            // Some problems last until a restart, and must not hide that a stop was confirmed.
             let confirmation = stop_confirmation(state, stop).map(|name| language.text(name).to_owned());
             return (confirmation.into_iter().chain(texts).collect::<Vec<_>>().join(" "), Mood::Bad);
         }
@@ -113,8 +114,8 @@ fn moving_or_ready(
     }
 }
 
-/// The text that confirms a stop to an arm with problems; `None` if there was no stop, or the arm moves again, or a joint has no
-/// torque although it should.
+/// The name of the text that confirms a stop of an arm that has problems. `None` if there was no stop, if the arm moves again, or
+/// if a joint may lack the torque to hold.
 fn stop_confirmation(state: &ArmState, stop: StopProgress) -> Option<&'static str> {
     let is_without_torque = state.problems.iter().any(|problem| {
         use ProblemKind::{LetGo, NoAnswer, NoServoAnswers, SupplyLost};
@@ -127,7 +128,7 @@ fn stop_confirmation(state: &ArmState, stop: StopProgress) -> Option<&'static st
     }
 }
 
-/// Why a movement ended early.
+/// The message for a movement that ended early.
 #[must_use]
 pub fn play_failure(language: Language, failure: &PlayFailure) -> String {
     format!("{} {}", language.text("play-failed"), play_reason(language, failure))
@@ -145,7 +146,7 @@ fn play_reason(language: Language, failure: &PlayFailure) -> String {
     }
 }
 
-/// Why the arm is not parked.
+/// The message for a failed park.
 #[must_use]
 pub fn park_failure(language: Language, failure: &ParkFailure) -> String {
     let reason = match failure {
@@ -156,13 +157,13 @@ pub fn park_failure(language: Language, failure: &ParkFailure) -> String {
     format!("{} {reason}", language.text("park-failed"))
 }
 
-/// Why a program of blocks ended early.
+/// The message for a program of blocks that ended early.
 #[must_use]
 pub fn program_failure(language: Language, failure: &ProgramFailure) -> String {
     format!("{} {}", language.text("program-failed"), program_reason(language, failure))
 }
 
-/// Why a program of blocks would end early, as its preview has found.
+/// The message for a preview in which the program ended early.
 #[must_use]
 pub fn preview_failure(language: Language, failure: &ProgramFailure) -> String {
     format!("{} {}", language.text("preview-failed"), program_reason(language, failure))
@@ -183,7 +184,7 @@ fn program_reason(language: Language, failure: &ProgramFailure) -> String {
     }
 }
 
-/// What is wrong with a program.
+/// The message for a fault in a program of blocks.
 #[must_use]
 pub fn program_fault(language: Language, fault: &ProgramFault) -> String {
     if language == Language::English {
@@ -208,12 +209,12 @@ pub fn program_fault(language: Language, fault: &ProgramFault) -> String {
     }
 }
 
-/// The numbers of joints.
+/// The numbers of these joints as a list.
 fn numbers(joints: impl Iterator<Item = Joint>) -> String {
     joints.map(|joint| joint.number().to_string()).collect::<Vec<_>>().join(", ")
 }
 
-/// Why a recording ended early.
+/// The message for a recording that ended early.
 #[must_use]
 pub fn recording_failure(language: Language, fault: &MoveFault) -> String {
     format!("{} {}", language.text("record-failed"), move_fault(language, fault))
@@ -231,7 +232,7 @@ fn move_fault(language: Language, fault: &MoveFault) -> String {
     }
 }
 
-/// The numbers of joints, bit n-1 for joint n.
+/// The numbers of the joints whose bits are set as a list, bit n-1 for joint n.
 fn joints(bits: u8) -> String {
     let numbers = (1..=7).filter(|number| bits >> (number - 1) & 1 == 1);
     numbers.map(|number| number.to_string()).collect::<Vec<_>>().join(", ")
@@ -241,10 +242,10 @@ fn joints(bits: u8) -> String {
 mod tests {
     use super::*;
 
-    /// An arm with these registers besides those of one that is well.
+    /// The state of an arm without problems, with these registers changed.
     fn with(registers: &[(u8, u8)]) -> ArmState {
         let mut all = sevenbot::Snapshot { address: 0, values: vec![0; 256] };
-        // Joints 2 and 3 in the middle of their linkage.
+        // Joints 2 and 3 are within the limits of their linkage.
         let well = [(29, motor_state::SERVO), (47, 115), (48, 65), (55, 115), (56, 65), (199, 1), (240, 1)];
         for &(address, value) in well.iter().chain(registers) {
             all.values[usize::from(address)] = value;

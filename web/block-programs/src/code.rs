@@ -1,4 +1,5 @@
-//! A program as a list of instructions for a machine with a stack of values. So a running program needs no stack of its host.
+//! A program as a list of instructions for a machine with its own stack of values, so that deep recursion in a program cannot
+//! overflow the stack of the host.
 
 use sevenbot::Joint;
 
@@ -7,10 +8,10 @@ use crate::fault::BlockId;
 use crate::program::{Arithmetic, Comparison, Variable};
 use crate::value::Value;
 
-/// One step of the machine. What it takes is on top of the stack, the last one topmost.
+/// One step of the machine. Its operands are on top of the stack, the last one topmost.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Step {
-    /// A block begins: the machine lets its host decide when to go on.
+    /// A block begins: the interpreter returns an event, so that its caller decides when to go on.
     Begin,
     Push(Value),
     Load(Variable),
@@ -21,14 +22,14 @@ pub(crate) enum Step {
     Pop,
     Jump(usize),
     JumpIfFalse(usize),
-    /// Keeps the value if it jumps, and drops it if not.
+    /// Jumps if the value on top has this truth, and keeps the value. If not, drops the value.
     JumpKeepingIf {
         truth: bool,
         to: usize,
     },
-    /// Makes the value a whole count of rounds.
+    /// Rounds the number of iterations towards zero; a negative number becomes 0.
     Count,
-    /// Takes one off the count, or drops it and jumps if none is left.
+    /// Decrements the number of remaining iterations. If it is 0, drops it and jumps.
     NextRound(usize),
     Sense(Sensor),
     Act(Act),
@@ -36,37 +37,37 @@ pub(crate) enum Step {
         function: usize,
         arguments: usize,
     },
-    /// Ends a function with the value on top.
+    /// Returns from a function, with the value on top as its result.
     Return,
     /// Ends the program.
     End,
 }
 
-/// A command whose numbers are on the stack.
+/// A command whose operands are on the stack. The documentation of each variant names the operands, the topmost last.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Act {
-    /// Angle, speed.
+    /// Angle in degrees, speed in degrees per second.
     MoveJoint(Joint),
-    /// Seven angles, seconds.
+    /// Seven angles in degrees, duration in seconds.
     Pose,
-    /// x, y, z, speed.
+    /// x, y, z in mm, speed in degrees per second.
     MoveTip(Tool),
-    /// x, y, z, speed.
+    /// x, y, z in mm, speed in mm/s.
     Line(Tool),
     Grip(bool),
     Vacuum(bool),
-    /// Seconds.
+    /// Duration in seconds.
     Wait,
 }
 
 /// A step and the block that it belongs to.
 pub(crate) type Instruction = (Step, BlockId);
 
-/// All steps of a program. Those of its body are the first.
+/// All instructions of a program: first the body of the program, which ends with [`Step::End`], then the functions.
 #[derive(Debug, Default)]
 pub(crate) struct Code {
     pub(crate) instructions: Vec<Instruction>,
-    /// Where the functions begin.
+    /// The index of the first instruction of each function.
     pub(crate) functions: Vec<usize>,
     pub(crate) globals: usize,
 }

@@ -1,4 +1,4 @@
-//! What a program wants of the arm.
+//! The commands and sensors of a program, and the ranges of their numbers.
 
 use std::ops::RangeInclusive;
 use std::time::Duration;
@@ -10,53 +10,53 @@ use sevenbot::{FineAngle, Joint, MoveTime, Speed};
 
 use crate::fault::{ProgramFault, Quantity};
 
-/// Speeds of the tip on a straight line, in mm/s. As those of the Python package.
+/// Speeds of the tip on a straight line, in mm/s. The Python package has the same range.
 pub const LINE_SPEEDS: RangeInclusive<f64> = 1.0..=500.0;
-/// The longest time of a wait, in seconds: a day. As that of the Python package.
+/// The longest wait, in seconds: a day. The Python package has the same limit.
 const LONGEST_WAIT: f64 = 86_400.0;
-/// The angle of joint 7 where the claw is open, and where it is closed, in degrees.
+/// The angles of joint 7 at which the claw is open and closed, in degrees.
 pub(crate) const CLAW: [f64; 2] = [84.0, 0.0];
 
-/// Something that the arm shall do. The program goes on when the arm has done it.
+/// A command for the arm. The program goes on when the arm has carried it out.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Command {
     /// Joints go to targets.
     Joints {
-        /// The targets.
+        /// One target for each joint; `None` for a joint that does not move.
         targets: FineTargets,
-        /// How fast.
+        /// The speed, or the duration.
         pace: Pace,
     },
-    /// The tip goes to a point, with the joints at their speed.
+    /// The tip goes to a point, on any path: each joint moves at its own speed.
     Tip {
-        /// In millimetres.
+        /// The point, in millimetres.
         tip: Vector,
-        /// The direction of the tool.
+        /// The direction of the tool, of length 1.
         tool: Vector,
-        /// How fast.
+        /// The speed of the joints.
         pace: Pace,
     },
     /// The tip goes to a point on a straight line.
     Line {
-        /// In millimetres.
+        /// The point, in millimetres.
         tip: Vector,
-        /// The direction of the tool.
+        /// The direction of the tool, of length 1.
         tool: Vector,
-        /// In millimetres per second.
+        /// The speed of the tip, in millimetres per second.
         speed: f64,
     },
-    /// The gripper opens or closes. It may hold something then.
+    /// The gripper opens or closes. It may stop at an object before it reaches its target.
     Grip {
         /// The target of joint 7.
         claw: FineAngle,
     },
-    /// The pump sucks or not.
+    /// Switches the pump on or off.
     Vacuum(bool),
-    /// Nothing, for this time.
+    /// The program waits for this time.
     Wait(Duration),
 }
 
-/// Something that a program wants to know of the arm.
+/// A value that a program reads from the arm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sensor {
     /// The measured angle of a joint, in degrees.
@@ -65,7 +65,7 @@ pub enum Sensor {
     Tip(Axis),
     /// The load of a joint, in percent of the stall torque.
     Load(Joint),
-    /// Does an obstacle keep a joint from its target?
+    /// Does an obstacle keep a joint from its target? Register 195 (D27).
     Blocked(Joint),
     /// Does the gripper hold something?
     Gripping,
@@ -93,7 +93,7 @@ pub(crate) enum Tool {
 }
 
 impl Tool {
-    /// The direction: x, y, z.
+    /// The direction as a unit vector: x, y, z.
     pub(crate) const fn direction(self) -> [i8; 3] {
         match self {
             Self::Down => [0, 0, -1],
@@ -114,31 +114,31 @@ const fn out_of_range(quantity: Quantity, value: f64, lowest: f64, highest: f64)
     ProgramFault::OutOfRange { quantity, value, lowest, highest }
 }
 
-/// A target of a joint.
+/// The target of a joint, in degrees. Fails outside 0 to 180.
 pub(crate) fn angle(degrees: f64) -> Result<FineAngle, ProgramFault> {
     FineAngle::from_degrees(degrees).ok_or(out_of_range(Quantity::Angle, degrees, 0.0, 180.0))
 }
 
-/// At this speed in degrees per second.
+/// The pace of joints at this speed, in degrees per second.
 pub(crate) fn joint_pace(speed: f64) -> Result<Pace, ProgramFault> {
     let steps = Speed::at_most(speed).ok_or(out_of_range(Quantity::JointSpeed, speed, 1.9, 190.0))?;
     Ok(Pace { speed: Some(steps), time: None })
 }
 
-/// In this time in seconds.
+/// The pace of joints that move for this time, in seconds.
 pub(crate) fn timed_pace(seconds: f64) -> Result<Pace, ProgramFault> {
     let time = MoveTime::at_least(seconds).ok_or(out_of_range(Quantity::Time, seconds, 0.1, 10.0))?;
     Ok(Pace { speed: None, time: Some(time) })
 }
 
-/// A speed of the tip in millimetres per second.
+/// Checks a speed of the tip, in millimetres per second, against [`LINE_SPEEDS`].
 pub(crate) fn line_speed(speed: f64) -> Result<f64, ProgramFault> {
     let (lowest, highest) = (*LINE_SPEEDS.start(), *LINE_SPEEDS.end());
     let is_allowed = LINE_SPEEDS.contains(&speed);
     is_allowed.then_some(speed).ok_or(out_of_range(Quantity::TipSpeed, speed, lowest, highest))
 }
 
-/// A time to wait.
+/// A time to wait, in seconds. Fails if it is negative or longer than [`LONGEST_WAIT`].
 pub(crate) fn wait(seconds: f64) -> Result<Duration, ProgramFault> {
     let time = Duration::try_from_secs_f64(seconds).ok().filter(|_| seconds <= LONGEST_WAIT);
     time.ok_or(out_of_range(Quantity::Time, seconds, 0.0, LONGEST_WAIT))

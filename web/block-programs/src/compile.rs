@@ -1,14 +1,14 @@
-//! Makes instructions of a program.
+//! Compiles the tree of a program to instructions.
 
 use crate::code::{Act, Code, Instruction, Step};
 use crate::fault::BlockId;
 use crate::program::{Expression, ExpressionKind, Function, Program, Statement, StatementKind};
 use crate::value::Value;
 
-/// A function without a value gives this one.
+/// The result of a function that returns no value.
 const NO_RESULT: Value = Value::Number(0.0);
 
-/// The instructions of a program.
+/// Compiles a program.
 pub(crate) fn compile(program: &Program) -> Code {
     let mut compiler = Compiler::default();
     compiler.statements(&program.body);
@@ -23,12 +23,12 @@ struct Compiler {
     loops: Vec<Loop>,
 }
 
-/// A loop that is compiled.
+/// A loop whose body is being compiled.
 struct Loop {
     head: usize,
-    /// Its count of rounds is on the stack.
+    /// The number of its remaining iterations is on the stack, and has to be dropped on a break.
     is_counted: bool,
-    /// Jumps to its end, which is not known yet.
+    /// The instructions that jump to the end of the loop, which is not known yet.
     exits: Vec<usize>,
 }
 
@@ -37,13 +37,13 @@ impl Compiler {
         self.instructions.push((step, block.clone()));
     }
 
-    /// As [`Self::add`]. Returns the place of the instruction.
+    /// As [`Self::add`]. Returns the index of the instruction.
     fn place(&mut self, step: Step, block: &BlockId) -> usize {
         self.add(step, block);
         self.instructions.len() - 1
     }
 
-    /// Lets a jump lead to the next instruction.
+    /// Sets the destination of the jump at this index to the next instruction to be added.
     fn land(&mut self, jump: usize) {
         let next = self.instructions.len();
         if let Some((
@@ -55,7 +55,7 @@ impl Compiler {
         }
     }
 
-    /// Returns where it begins.
+    /// Compiles a function. Returns the index of its first instruction.
     fn function(&mut self, function: &Function) -> usize {
         let begin = self.place(Step::Begin, &function.block);
         self.statements(&function.body);
@@ -225,7 +225,8 @@ impl Compiler {
         }
     }
 
-    /// As in Python the second part counts only if the first one does not decide.
+    /// Compiles "and" (`truth` false) or "or" (`truth` true). As in Python, the second operand is evaluated only if the first
+    /// one does not decide the result.
     fn choose(&mut self, block: &BlockId, [one, other]: &[Expression; 2], truth: bool) {
         self.expression(one);
         let end = self.place(Step::JumpKeepingIf { truth, to: 0 }, block);

@@ -1,4 +1,4 @@
-//! Why a workspace is no program, or why a program ends early.
+//! The errors of a program: those of parsing, and those that end it while it runs.
 
 use std::fmt;
 use std::rc::Rc;
@@ -6,30 +6,30 @@ use std::rc::Rc;
 /// The identifier that Blockly gave to a block.
 pub type BlockId = Rc<str>;
 
-/// A fault, and the block where it is.
+/// A fault, and the block that causes it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ProgramError {
-    /// `None` if it is that of the whole workspace.
+    /// `None` if the fault concerns the workspace as a whole.
     pub block: Option<BlockId>,
     /// What is wrong.
     pub fault: ProgramFault,
 }
 
-/// What a number of a block stands for.
+/// The physical quantity of a number in a block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
-    /// Of a joint, in degrees.
+    /// The angle of a joint, in degrees.
     Angle,
-    /// Of a joint, in degrees per second.
+    /// The speed of a joint, in degrees per second.
     JointSpeed,
-    /// Of the tip, in millimetres per second.
+    /// The speed of the tip, in millimetres per second.
     TipSpeed,
-    /// In seconds.
+    /// A duration, in seconds.
     Time,
 }
 
 impl Quantity {
-    /// The unit.
+    /// The symbol of the unit, the same in all languages.
     #[must_use]
     pub const fn unit(self) -> &'static str {
         match self {
@@ -44,41 +44,41 @@ impl Quantity {
 /// What is wrong with a program.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ProgramFault {
-    /// The text is no workspace of Blockly.
+    /// The text is no workspace of Blockly. Holds the message of the JSON parser.
     NotAWorkspace(String),
-    /// The text is too long.
+    /// The text is longer than 200,000 bytes.
     TooLarge,
-    /// Blocks are nested too deeply.
+    /// Blocks are nested more than 60 deep. Blocks below one another do not count.
     TooDeep,
-    /// There is no block with which the program starts.
+    /// The block that starts a program is missing.
     NoStart,
-    /// There are several blocks with which the program starts.
+    /// More than one block starts the program.
     SeveralStarts,
-    /// This kind of block is not known here.
+    /// The parser does not know this kind of block.
     UnknownBlock(String),
     /// This input of the block is empty.
     EmptyInput(String),
-    /// This field of the block has a value that it cannot have.
+    /// This field of the block is missing or has an invalid value.
     BadField(String),
     /// No block defines this function.
     UnknownFunction(String),
-    /// The block ends a loop, and is in none.
+    /// The block leaves or continues a loop, but is not in one.
     NotInLoop,
-    /// The block ends a function, and is in none.
+    /// The block returns from a function, but is not in one.
     NotInFunction,
-    /// The result is no finite number, as after a division by zero.
+    /// The result of a calculation is not finite, for example after a division by zero.
     NoNumber,
-    /// Functions call each other without an end.
+    /// More than [`MOST_CALLS`](crate::MOST_CALLS) calls of functions are open: the recursion has no end.
     TooManyCalls,
     /// A number is out of its range.
     OutOfRange {
-        /// What it stands for.
+        /// The quantity, which determines the unit.
         quantity: Quantity,
         /// The number.
         value: f64,
-        /// The lowest that is allowed.
+        /// The lowest allowed value.
         lowest: f64,
-        /// The highest that is allowed.
+        /// The highest allowed value.
         highest: f64,
     },
 }
@@ -118,12 +118,12 @@ impl fmt::Display for ProgramError {
 impl std::error::Error for ProgramError {}
 
 impl ProgramFault {
-    /// At this block.
+    /// The error that shows this fault at a block.
     pub(crate) fn at(self, block: &BlockId) -> ProgramError {
         ProgramError { block: Some(BlockId::clone(block)), fault: self }
     }
 
-    /// Of the whole workspace.
+    /// The error without a block: the fault concerns the workspace as a whole.
     pub(crate) const fn of_workspace(self) -> ProgramError {
         ProgramError { block: None, fault: self }
     }

@@ -1,4 +1,4 @@
-//! Runs a program: tells what it wants, one thing at a time.
+//! Runs a program without input or output: returns its commands and its reads of sensors, one at a time.
 
 use crate::code::{Act, Code, Step};
 use crate::command::{CLAW, Command, Sensor, angle, joint_pace, line_speed, timed_pace, wait};
@@ -9,17 +9,17 @@ use crate::value::Value;
 
 use sevenbot::cartesian::Vector;
 
-/// So many calls may be open at a time.
+/// The most calls of functions that may be open at the same time.
 pub const MOST_CALLS: usize = 200;
 
-/// What a program wants.
+/// The next thing that a program does.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Event {
-    /// This block begins. The program goes on at the next call.
+    /// This block begins. The program goes on at the next call of [`Interpreter::advance`].
     Begin(BlockId),
     /// The arm has to do this before the program goes on.
     Command(Command),
-    /// The program goes on after [`Interpreter::answer`].
+    /// The program reads this sensor. Call [`Interpreter::answer`] before the next [`Interpreter::advance`].
     Sensor(Sensor),
     /// The program is over.
     Over,
@@ -47,17 +47,17 @@ pub struct Interpreter {
     calls: Vec<OpenCall>,
 }
 
-/// A function that was called and has not ended.
+/// A call of a function that has not returned yet.
 #[derive(Debug)]
 struct OpenCall {
-    /// Where the caller goes on.
+    /// The index of the instruction after the call.
     back: usize,
-    /// Where its parameters begin on the stack.
+    /// The index of its first argument on the stack.
     base: usize,
 }
 
 impl Interpreter {
-    /// At the beginning of a program. All variables are 0.
+    /// Creates an interpreter at the beginning of a program. All variables are 0.
     #[must_use]
     pub fn new(program: &Program) -> Self {
         let code = compile(program);
@@ -65,10 +65,11 @@ impl Interpreter {
         Self { code, next: 0, stack: Vec::new(), globals, calls: Vec::new() }
     }
 
-    /// Goes on until the program wants something. Takes at most one round of a loop, or one call.
+    /// Runs the program to its next event. Returns after at most one iteration of a loop or one call of a function. Returns
+    /// [`Event::Over`] again and again after the end.
     ///
     /// # Errors
-    /// The program cannot go on, and the block where that shows.
+    /// A number is out of range or not finite, or too many calls are open. The error names the block.
     pub fn advance(&mut self) -> Result<Event, ProgramError> {
         while let Some((step, block)) = self.code.instructions.get(self.next).cloned() {
             self.next += 1;
@@ -79,7 +80,7 @@ impl Interpreter {
         Ok(Event::Over)
     }
 
-    /// Gives the value of the sensor that the program waits for.
+    /// Supplies the value of the sensor that the last [`Event::Sensor`] asked for.
     pub fn answer(&mut self, value: Value) {
         self.stack.push(value);
     }
@@ -122,7 +123,7 @@ impl Interpreter {
         Ok(None)
     }
 
-    /// Steps that decide which step is next.
+    /// Carries out the steps that change the order of the instructions: jumps, loops, calls and returns.
     fn flow(&mut self, step: Step) -> Result<(), ProgramFault> {
         match step {
             Step::Jump(to) => self.next = to,
@@ -180,12 +181,12 @@ impl Interpreter {
         }
     }
 
-    /// The compiler pops only what it has pushed.
+    /// Takes the value on top of the stack. Compiled code never pops from an empty stack.
     fn pop(&mut self) -> Value {
         self.stack.pop().unwrap_or(Value::Number(0.0))
     }
 
-    /// The numbers on top of the stack, in their order.
+    /// Takes the `N` numbers on top of the stack, in the order in which they were pushed.
     fn numbers<const N: usize>(&mut self) -> [f64; N] {
         let mut numbers = [0.0; N];
         for number in numbers.iter_mut().rev() {

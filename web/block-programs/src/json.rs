@@ -1,7 +1,7 @@
-//! Blockly's JSON of a workspace: blocks, their fields and their connections. Knows no kind of block.
+//! Blockly's JSON of a workspace: blocks, their fields and their connections. This file does not know the kinds of blocks.
 //!
-//! The block below another one is nested in it. So a long stack would be nested deeply, and a parser that calls itself would need
-//! much memory. Here connections stay text until they are followed.
+//! In this JSON each block contains the block below it, so that a long stack of blocks is deeply nested. To bound the recursion
+//! of the parser, a connection stays unparsed text until it is followed.
 
 use std::collections::BTreeMap;
 
@@ -11,7 +11,7 @@ use serde_json::value::RawValue;
 
 use crate::fault::{BlockId, ProgramError, ProgramFault};
 
-/// A longer text is no program of a person, in bytes. A stack takes time with the square of its length.
+/// The largest workspace, in bytes: more than a person builds. The time to parse a stack grows with the square of its length.
 const LARGEST: usize = 200_000;
 
 #[derive(Deserialize)]
@@ -34,7 +34,7 @@ pub(crate) struct VariableModel {
     pub(crate) name: String,
 }
 
-/// One block.
+/// A block. The blocks in its inputs and below it are not parsed yet.
 #[derive(Deserialize)]
 pub(crate) struct Block<'a> {
     #[serde(rename = "type")]
@@ -47,7 +47,7 @@ pub(crate) struct Block<'a> {
     inputs: BTreeMap<String, Connection<'a>>,
     #[serde(borrow, default)]
     next: Option<Connection<'a>>,
-    /// What a block tells of its own shape.
+    /// The state of a block with a variable shape, such as the number of its branches or the parameters of its function.
     #[serde(default, rename = "extraState")]
     pub(crate) extra: Value,
     #[serde(default, rename = "disabledReasons")]
@@ -55,7 +55,7 @@ pub(crate) struct Block<'a> {
     enabled: Option<bool>,
 }
 
-/// The identifier of a block in JSON.
+/// A [`BlockId`] that serde can parse from a string.
 #[derive(Deserialize)]
 #[serde(from = "String")]
 pub(crate) struct BlockText(pub(crate) BlockId);
@@ -79,7 +79,7 @@ struct Connection<'a> {
 }
 
 impl<'a> Connection<'a> {
-    /// The block there. A shadow shows through where there is no other.
+    /// The connected block, or else the shadow block: Blockly's default value of an input.
     fn block(&self) -> Result<Option<Block<'a>>, ProgramError> {
         self.block.or(self.shadow).map(block).transpose()
     }
@@ -102,7 +102,7 @@ impl<'a> Workspace<'a> {
         serde_json::from_str(text).map_err(no_workspace)
     }
 
-    /// The blocks that are below no other.
+    /// The blocks that no other block contains.
     pub(crate) fn top_blocks(&self) -> Result<Vec<Block<'a>>, ProgramError> {
         self.blocks.blocks.iter().map(|&text| block(text)).collect()
     }
@@ -117,23 +117,23 @@ impl<'a> Block<'a> {
         self.disabled_reasons.is_empty() && self.enabled != Some(false)
     }
 
-    /// The block in an input, if there is one.
+    /// The enabled block in an input; `None` if the input is empty.
     pub(crate) fn input(&self, name: &str) -> Result<Option<Block<'a>>, ProgramError> {
         let block = self.inputs.get(name).map(Connection::block).transpose()?.flatten();
         Ok(block.filter(Block::is_enabled))
     }
 
-    /// The block below, if there is one.
+    /// The block below this one, also if it is disabled.
     pub(crate) fn next(&self) -> Result<Option<Block<'a>>, ProgramError> {
         Ok(self.next.as_ref().map(Connection::block).transpose()?.flatten())
     }
 
-    /// A field with a text.
+    /// The value of a field that holds a text.
     pub(crate) fn text(&self, field: &str) -> Result<&str, ProgramError> {
         self.fields.get(field).and_then(Value::as_str).ok_or_else(|| self.bad_field(field))
     }
 
-    /// A field with a number.
+    /// The value of a field that holds a number.
     pub(crate) fn number(&self, field: &str) -> Result<f64, ProgramError> {
         self.fields.get(field).and_then(Value::as_f64).ok_or_else(|| self.bad_field(field))
     }
@@ -144,7 +144,7 @@ impl<'a> Block<'a> {
         id.ok_or_else(|| self.bad_field(field))
     }
 
-    /// What a field chooses, of these choices with their names.
+    /// The choice that a field selects by its name.
     pub(crate) fn choice<T: Copy>(&self, field: &str, choices: &[(&str, T)]) -> Result<T, ProgramError> {
         let name = self.text(field)?;
         let found = choices.iter().find(|(known, _)| *known == name);

@@ -1,4 +1,4 @@
-//! Programs of Blockly's blocks for an arm: without a browser, an arm, input or output, or a clock.
+//! Programs made of Blockly's blocks for an arm. This crate needs no browser, arm or clock, and does no input or output.
 //!
 //! ```text
 //!   JSON of Blockly's workspace ──▶ Program ──▶ python: the same program for the package `sevenbot`
@@ -8,8 +8,8 @@
 //!                                                        └──────────── value of the sensor ───┘
 //! ```
 //!
-//! [`Interpreter::advance`] never loops for long: each round of a loop and each call of a function is an event. So whoever runs
-//! an endless program decides how much of it runs at a time.
+//! [`Interpreter::advance`] never loops for long: each iteration of a loop and each call of a function is an event. So the caller
+//! decides how much of an endless program runs at a time.
 
 #![forbid(unsafe_code)]
 

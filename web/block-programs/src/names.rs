@@ -1,8 +1,8 @@
-//! Names of variables and functions that Python takes.
+//! Converts the names of variables and functions to valid Python names, each of which is used once.
 
 use std::collections::HashSet;
 
-/// Words that a name may not be: those of Python, and what the program itself uses.
+/// Reserved names: the keywords of Python, and the names that the written program uses itself.
 const TAKEN: [&str; 42] = [
     "False", "None", "True", "and", "as", "assert", "async", "await", "break", "class", "continue", "def",
     "del", "elif", "else", "except", "finally", "for", "from", "global", "if", "import", "in", "is",
@@ -10,7 +10,7 @@ const TAKEN: [&str; 42] = [
     "int", "range", "sevenbot", "sys", "_", "__name__",
 ];
 
-/// Names that are given out once.
+/// The names that are taken.
 pub(crate) struct Names(HashSet<String>);
 
 impl Names {
@@ -18,7 +18,7 @@ impl Names {
         Self(TAKEN.iter().map(|&word| word.to_owned()).collect())
     }
 
-    /// A name like this one that no other has.
+    /// Takes a free Python name for this name. If the name is taken, adds a number from 2 on.
     pub(crate) fn give(&mut self, name: &str) -> String {
         let like = identifier(name);
         let others = (2..).map(|number| format!("{like}_{number}"));
@@ -29,7 +29,7 @@ impl Names {
     }
 }
 
-/// Letters, digits and Chinese characters stay: Python takes them as they are.
+/// Replaces characters that a Python name cannot have by `_`. ASCII letters, digits and Chinese characters stay.
 fn identifier(name: &str) -> String {
     let is_plain =
         |letter: &char| letter.is_ascii_alphanumeric() || ('\u{4e00}'..='\u{9fff}').contains(letter);

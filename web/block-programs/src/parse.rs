@@ -1,4 +1,4 @@
-//! Parses blocks: which kinds there are, and which inputs and fields they have.
+//! Parses blocks to the tree of a program. This file knows the kinds of blocks, their inputs and their fields.
 
 use std::collections::HashMap;
 
@@ -11,12 +11,12 @@ use crate::program::{
     Arithmetic, Comparison, Expression, ExpressionKind, Function, Program, Statement, StatementKind, Variable,
 };
 
-/// The block with which a program starts.
+/// The kind of the block that starts a program.
 const START: &str = "arm_start";
-/// A function without a value, and one with a value.
+/// The kinds of the blocks that define a function: without a result, and with one.
 const FUNCTIONS: [&str; 2] = ["procedures_defnoreturn", GIVES_VALUE];
 const GIVES_VALUE: &str = "procedures_defreturn";
-/// Deeper nested blocks are an error. Each level needs some hundred bytes of the stack.
+/// The deepest nesting of blocks. The parser is recursive: each level needs a few hundred bytes of stack.
 const DEEPEST: usize = 60;
 
 const AXES: [(&str, Axis); 3] = [("X", Axis::X), ("Y", Axis::Y), ("Z", Axis::Z)];
@@ -44,16 +44,16 @@ const COMPARISONS: [(&str, Comparison); 6] = [
 ];
 
 impl Program {
-    /// From the text of Blockly's `serialization.workspaces.save`.
+    /// Parses the JSON text of what Blockly's `serialization.workspaces.save` returns.
     ///
     /// # Errors
-    /// It is no program, and the block where that shows.
+    /// The text is no valid program. The error names the block, if one causes it.
     pub fn parse(workspace: &str) -> Result<Self, ProgramError> {
         program(workspace)
     }
 }
 
-/// Parses a workspace. Blocks that are neither below the start nor a function are left out.
+/// Parses a workspace. Ignores blocks that are neither below the start block nor part of a function.
 fn program(text: &str) -> Result<Program, ProgramError> {
     let workspace = Workspace::of(text)?;
     let blocks: Vec<_> = workspace.top_blocks()?.into_iter().filter(Block::is_enabled).collect();
@@ -82,7 +82,7 @@ fn program(text: &str) -> Result<Program, ProgramError> {
 /// A function that blocks may call.
 struct KnownFunction {
     number: usize,
-    /// How many it has.
+    /// The number of its parameters.
     parameters: usize,
 }
 
@@ -98,21 +98,24 @@ impl FunctionKind {
     }
 }
 
-/// Where a block is: which names it sees.
+/// The position of a block in the program, and the names that are visible there.
 #[derive(Clone)]
 struct Scope<'a> {
-    /// By their identifiers.
+    /// The visible variables and parameters, by their identifiers.
     variables: HashMap<String, Variable>,
-    /// By their names.
+    /// All functions of the program, by their names.
     functions: &'a HashMap<String, KnownFunction>,
-    /// The function that the block is in.
+    /// The kind of the function that contains the block; `None` in the body of the program.
     function: Option<FunctionKind>,
     loops: usize,
     depth: usize,
 }
 
 impl Scope<'_> {
-    /// The scope within a block.
+    /// The scope within a block, one level deeper.
+    ///
+    /// # Errors
+    /// The block is nested too deeply.
     fn within(&self, block: &Block<'_>) -> Result<Self, ProgramError> {
         if self.depth >= DEEPEST {
             return Err(block.fault(ProgramFault::TooDeep));
@@ -141,7 +144,7 @@ impl Scope<'_> {
         })
     }
 
-    /// A block, and those below it.
+    /// Parses a block and all blocks below it. Skips disabled blocks.
     fn statements(&self, first: Option<Block<'_>>) -> Result<Vec<Statement>, ProgramError> {
         let (mut statements, mut next) = (Vec::new(), first);
         while let Some(block) = next {
@@ -185,7 +188,7 @@ impl Scope<'_> {
         })
     }
 
-    /// What decides which block is next.
+    /// Parses a block that changes the order of the blocks: a loop, a branch, a break or a return.
     fn flow(&self, block: &Block<'_>) -> Result<StatementKind, ProgramError> {
         Ok(match block.kind.as_str() {
             "controls_repeat_ext" => {
@@ -272,7 +275,7 @@ impl Scope<'_> {
         Ok([self.input(block, "X")?, self.input(block, "Y")?, self.input(block, "Z")?])
     }
 
-    /// The expression in an input, which may not be empty.
+    /// Parses the expression in an input. An empty input is an error.
     fn input(&self, block: &Block<'_>, name: &str) -> Result<Expression, ProgramError> {
         let inner =
             block.input(name)?.ok_or_else(|| block.fault(ProgramFault::EmptyInput(name.to_owned())))?;

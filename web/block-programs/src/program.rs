@@ -1,14 +1,14 @@
-//! A program as a tree: what the parser makes of Blockly's blocks.
+//! The tree of a program, which the parser makes from Blockly's blocks.
 
 use sevenbot::Joint;
 
 use crate::command::{Axis, Sensor, Tool};
 use crate::fault::BlockId;
 
-/// A program.
+/// A parsed program. [`Interpreter`](crate::Interpreter) runs it, and [`python`](crate::python()) writes it as Python.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Program {
-    /// The names of the variables.
+    /// The names of the variables, as the user typed them.
     pub(crate) variables: Vec<String>,
     pub(crate) functions: Vec<Function>,
     pub(crate) body: Vec<Statement>,
@@ -18,7 +18,7 @@ pub struct Program {
 pub(crate) struct Function {
     pub(crate) block: BlockId,
     pub(crate) name: String,
-    /// Its parameters hide these variables.
+    /// The indices of the variables that its parameters hide: Blockly makes a variable for each parameter.
     pub(crate) parameters: Vec<usize>,
     pub(crate) body: Vec<Statement>,
     pub(crate) result: Option<Expression>,
@@ -37,7 +37,7 @@ pub(crate) enum StatementKind {
         angle: Expression,
         speed: Expression,
     },
-    /// Angles in degrees, and the seconds of the way.
+    /// Angles in degrees, and the duration of the move in seconds.
     Pose {
         angles: [f64; 7],
         seconds: f64,
@@ -76,7 +76,7 @@ pub(crate) enum StatementKind {
         function: usize,
         arguments: Vec<Expression>,
     },
-    /// Ends the function with this value, or with none.
+    /// Returns from the function if the first expression is true. The second one is the result; `None` if there is none.
     Return(Expression, Option<Expression>),
 }
 
@@ -100,7 +100,7 @@ pub(crate) enum ExpressionKind {
     Call { function: usize, arguments: Vec<Expression> },
 }
 
-/// A variable of the program, or a parameter of the function, by its number.
+/// A variable of the program, or a parameter of the current function, by its index.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Variable {
     Global(usize),

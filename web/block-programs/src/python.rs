@@ -12,7 +12,7 @@ use crate::program::{
     Arithmetic, Comparison, Expression, ExpressionKind, Function, Program, Statement, StatementKind, Variable,
 };
 
-/// How tightly parts of an expression are bound.
+/// The precedence of Python's operators: a higher one binds tighter. `WHOLE` never needs brackets.
 mod binding {
     pub(super) const OR: u8 = 1;
     pub(super) const AND: u8 = 2;
@@ -25,7 +25,7 @@ mod binding {
     pub(super) const WHOLE: u8 = 9;
 }
 
-/// The program as Python. It takes the name of a port as its argument, or finds the only arm.
+/// Writes a program as Python. Its argument is the name of a port. Without one, it uses the only connected arm.
 ///
 /// ```
 /// let workspace = r#"{"blocks": {"blocks": [{"type": "arm_start", "id": "a", "next": {"block":
@@ -57,18 +57,18 @@ pub fn python(program: &Program) -> String {
 }
 
 fn line(text: &mut String, depth: usize, content: &str) {
-    // A text takes all that is written.
+    // Writing to a `String` cannot fail.
     let _ = writeln!(text, "{:indent$}{content}", "", indent = 4 * depth);
 }
 
-/// The names that a part of the program sees.
+/// Writes a part of the program, with the names that are visible there.
 #[derive(Clone, Copy)]
 struct Writer<'a> {
     globals: &'a [String],
     functions: &'a [String],
-    /// The variables that they hide.
+    /// The variables that the parameters of the current function hide. Blockly gives a parameter the name of its variable.
     parameters: &'a [usize],
-    /// The variables that the program needs.
+    /// Collects the variables that the program uses: only these are defined.
     used: &'a RefCell<BTreeSet<usize>>,
 }
 
@@ -139,7 +139,7 @@ impl Writer<'_> {
         }
     }
 
-    /// A statement of one line.
+    /// A statement that needs only one line.
     fn simple(&self, kind: &StatementKind) -> String {
         match kind {
             StatementKind::MoveJoint { joint, angle, speed } => {
@@ -192,18 +192,18 @@ impl Writer<'_> {
         number.and_then(|number| self.globals.get(number)).map_or("", String::as_str)
     }
 
-    /// An expression that stands for itself.
+    /// An expression that needs no brackets around it.
     fn plain(&self, expression: &Expression) -> String {
         self.expression(expression).0
     }
 
-    /// An expression beside an operator that binds this tightly.
+    /// An expression beside an operator, in brackets if its precedence is below `least`.
     fn bound(&self, expression: &Expression, least: u8) -> String {
         let (text, binding) = self.expression(expression);
         if binding >= least { text } else { format!("({text})") }
     }
 
-    /// The text, and how tightly its parts are bound.
+    /// The text of an expression, and its precedence.
     fn expression(&self, expression: &Expression) -> (String, u8) {
         let pair = |pair: &[Expression; 2], word: &str, binding: u8, [left, right]: [u8; 2]| {
             let text = format!("{} {word} {}", self.bound(&pair[0], left), self.bound(&pair[1], right));
@@ -220,7 +220,7 @@ impl Writer<'_> {
             ExpressionKind::Not(inner) => (format!("not {}", self.bound(inner, binding::NOT)), binding::NOT),
             ExpressionKind::And(parts) => pair(parts, "and", binding::AND, [binding::AND, binding::NOT]),
             ExpressionKind::Or(parts) => pair(parts, "or", binding::OR, [binding::OR, binding::AND]),
-            // Python would read three in a row as two comparisons.
+            // A comparison of a comparison needs brackets: Python chains `a < b < c` as `a < b and b < c`.
             ExpressionKind::Compare(how, parts) => {
                 pair(parts, compared(*how), binding::COMPARISON, [binding::SUM; 2])
             }
@@ -236,7 +236,7 @@ fn number(value: f64) -> String {
     format!("{value}")
 }
 
-/// Targets of a pose in which only this joint moves.
+/// The seven arguments of `pose` that move only this joint.
 fn targets(joint: Joint, angle: &str) -> String {
     Joint::ALL.map(|other| if other == joint { angle } else { "None" }).join(", ")
 }
@@ -270,7 +270,7 @@ const fn compared(comparison: Comparison) -> &'static str {
     }
 }
 
-/// The operator, how tightly it binds, and how tightly its two sides have to be bound.
+/// The operator, its precedence, and the lowest precedence of its left and right operand without brackets.
 const fn calculated(operation: Arithmetic) -> (&'static str, u8, [u8; 2]) {
     use binding::{POWER, PRODUCT, SIGN, SUM, WHOLE};
     match operation {

@@ -1,4 +1,4 @@
-//! What variables and inputs hold: numbers and truth values, with the rules of Python.
+//! The values of variables and inputs: numbers and truth values, with the conversions of Python.
 
 use crate::fault::ProgramFault;
 use crate::program::{Arithmetic, Comparison};
@@ -6,19 +6,22 @@ use crate::program::{Arithmetic, Comparison};
 /// A number or a truth value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Value {
-    /// A finite number.
+    /// A finite number: a calculation with any other result is an error.
     Number(f64),
     /// True or false.
     Truth(bool),
 }
 
 impl Value {
-    /// A number, if it is finite.
+    /// Creates a number.
+    ///
+    /// # Errors
+    /// The number is infinite or NaN.
     pub(crate) const fn finite(number: f64) -> Result<Self, ProgramFault> {
         if number.is_finite() { Ok(Self::Number(number)) } else { Err(ProgramFault::NoNumber) }
     }
 
-    /// As a number: true is 1.
+    /// Converts to a number: true is 1, false is 0.
     #[must_use]
     pub fn number(self) -> f64 {
         match self {
@@ -27,7 +30,7 @@ impl Value {
         }
     }
 
-    /// As a truth value: 0 is false.
+    /// Converts to a truth value: 0 is false, any other number is true.
     #[must_use]
     pub fn truth(self) -> bool {
         match self {
@@ -61,7 +64,7 @@ impl Value {
     }
 }
 
-/// As in Python, with the sign of the divisor.
+/// The remainder as in Python: its sign is that of the divisor.
 fn remainder(one: f64, other: f64) -> f64 {
     let rest = one % other;
     if rest != 0.0 && (rest < 0.0) != (other < 0.0) { rest + other } else { rest }
@@ -79,7 +82,7 @@ mod tests {
     fn results_are_those_of_python_or_an_error() {
         assert_eq!(calculated(-7.0, Arithmetic::Remainder, 3.0), Ok(2.0));
         assert_eq!(calculated(7.0, Arithmetic::Remainder, -3.0), Ok(-2.0));
-        // Python 3 prints these.
+        // Results of Python 3.
         for (one, other, rest) in [
             (1.0, 0.1, 0.09999999999999995),
             (-1.0, 0.1, 5.551115123125783e-17),

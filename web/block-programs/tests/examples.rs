@@ -1,4 +1,4 @@
-//! The table of blocks, and the examples that every test of blocks uses.
+//! Checks the table of blocks, and that the examples in `examples/`, which other tests run, use every block.
 
 #![allow(clippy::expect_used, clippy::indexing_slicing)] // A panic is a failed test.
 
@@ -8,7 +8,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
-/// The kinds of the blocks in a text of JSON: those that it defines, offers or uses.
+/// Collects the kinds of all blocks that occur in a JSON value: in definitions, in the toolbox or in a program.
 fn kinds(json: &Value, found: &mut BTreeSet<String>) {
     match json {
         Value::Object(members) => {
@@ -32,7 +32,7 @@ fn kinds_in(path: &Path) -> BTreeSet<String> {
     found
 }
 
-/// Blockly itself offers these, for variables and functions.
+/// The blocks that Blockly itself adds to the toolbox, for variables and functions.
 const OFFERED_BY_BLOCKLY: [&str; 7] = [
     "variables_get",
     "variables_set",

@@ -1,31 +1,31 @@
-//! A learner's attempt at an exercise: which goals are reached.
+//! A learner's attempt at an exercise: checks the goals against what the arm measures.
 
 use crate::exercise::Exercise;
 use crate::goal::Goal;
 use crate::path::{PathProgress, distance};
 
-/// A joint is at an angle if it has been there for this long, in seconds.
+/// A goal for a joint or a thing is reached after the joint or thing has been in place for this long, in seconds.
 const AT_REST: f64 = 0.5;
 
-/// What the arm measures at one time.
+/// What was measured at one instant, in the arm and on the table.
 #[derive(Clone, Debug, Default)]
 pub struct Observation {
-    /// The time in seconds, from any start.
+    /// The time in seconds, from any fixed instant.
     pub seconds: f64,
-    /// The tip: x, y, z in mm; `None` if a joint is not measured.
+    /// The tip: x, y, z in mm; `None` if one of joints 1 to 6 is not measured.
     pub tip: Option<[f64; 3]>,
-    /// The joints in degrees, joint 1 first; `None` where it is not measured.
+    /// The angles in degrees, joint 1 first; `None` for a joint that is not measured.
     pub joints: [Option<f64>; 7],
-    /// The joints that are blocked, as register 195 shows them.
+    /// The blocked joints, as in register 195 (D27): bit n-1 for joint n.
     pub blocked: u8,
-    /// The things on the table.
+    /// The things on the table; empty for a real arm.
     pub things: Vec<SeenThing>,
 }
 
-/// Where a thing on the table is.
+/// The position of a thing on the table.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SeenThing {
-    /// Its name.
+    /// Its name in the scene.
     pub name: String,
     /// Its middle: x, y, z in mm.
     pub at: [f64; 3],
@@ -42,7 +42,7 @@ enum Progress {
     There(f64),
 }
 
-/// An attempt.
+/// An attempt at an exercise.
 ///
 /// ```
 /// use exercises::{Attempt, Exercise, Observation};
@@ -57,11 +57,12 @@ enum Progress {
 pub struct Attempt {
     goals: Vec<(Goal, Progress)>,
     in_order: bool,
+    /// The times of the first and the last observation, in seconds.
     seconds: Option<(f64, f64)>,
 }
 
 impl Attempt {
-    /// An attempt at an exercise, with no goal reached.
+    /// Begins an attempt, with no goal reached.
     #[must_use]
     pub fn new(exercise: &Exercise) -> Self {
         let progress = |goal: &Goal| match goal {
@@ -72,7 +73,7 @@ impl Attempt {
         Self { goals, in_order: exercise.in_order, seconds: None }
     }
 
-    /// Takes what the arm measures. Returns whether a goal was reached now.
+    /// Takes an observation. Returns true if it reaches a goal. After the exercise is solved it has no effect.
     pub fn observe(&mut self, seen: &Observation) -> bool {
         if self.is_solved() {
             return false;
@@ -93,7 +94,7 @@ impl Attempt {
         is_any_reached
     }
 
-    /// Which goals are reached, in their order.
+    /// Whether each goal is reached, in the order of the exercise.
     pub fn reached(&self) -> impl Iterator<Item = bool> {
         self.goals.iter().map(|(_, progress)| matches!(progress, Progress::Reached))
     }
@@ -104,7 +105,7 @@ impl Attempt {
         self.reached().all(|is_reached| is_reached)
     }
 
-    /// From the first observation to the last one that was needed, in seconds.
+    /// The time from the first observation to the last one, in seconds. The observation that solves the exercise is the last one.
     #[must_use]
     pub fn duration(&self) -> f64 {
         self.seconds.map_or(0.0, |(start, end)| end - start)
@@ -132,7 +133,7 @@ fn is_reached(goal: &Goal, progress: &mut Progress, seen: &Observation) -> bool 
     }
 }
 
-/// Has something been where it should be for long enough?
+/// Has a joint or thing been in place for at least [`AT_REST`]?
 fn rests(progress: &mut Progress, seconds: f64, is_there: bool) -> bool {
     if !is_there {
         *progress = Progress::Open;

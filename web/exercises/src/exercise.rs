@@ -6,7 +6,7 @@ use crate::goal::Goal;
 use crate::solution::{SolutionPart, Step, parts};
 use crate::text::Text;
 
-/// A longer file is no exercise, in bytes.
+/// The largest file of an exercise, in bytes.
 const LARGEST: usize = 200_000;
 
 /// An exercise.
@@ -22,32 +22,32 @@ const LARGEST: usize = 200_000;
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Exercise {
-    /// Its name in the list.
+    /// Its title in the list of exercises.
     pub title: Text,
-    /// What is to be done.
+    /// The task, for the learner.
     pub text: Text,
-    /// Shown one after the other, if the learner asks.
+    /// Shown one after the other, when the learner asks for a hint.
     #[serde(default)]
     pub hints: Vec<Text>,
-    /// What has to be reached.
+    /// The goals. An exercise has at least one.
     pub goals: Vec<Goal>,
-    /// Is a goal reached only after all goals before it?
+    /// Must the goals be reached in their order?
     #[serde(default)]
     pub in_order: bool,
-    /// What happens to the simulated arm at the start, such as `fault 1=wall=120`.
+    /// Actions on the simulated arm at the start, such as `fault 1=wall=120`. A real arm cannot do an exercise that has some.
     #[serde(default)]
     pub setup: Vec<String>,
-    /// A solution, step by step.
+    /// The steps of a solution; empty if the file has none.
     #[serde(default)]
     solution: Vec<Step>,
 }
 
-/// Why a text is no exercise.
+/// The reason why a text is no valid exercise.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ExerciseError {
     /// The line of the file, from 1; 0 for the file as a whole.
     pub line: usize,
-    /// Why, in English.
+    /// The reason, in English.
     pub reason: String,
 }
 
@@ -66,7 +66,7 @@ impl Exercise {
     /// Parses the file of an exercise.
     ///
     /// # Errors
-    /// It is no JSON, something is missing or unknown, or a goal can never be reached.
+    /// The text is longer than 200,000 bytes or no JSON, a member is missing or unknown, or a goal can never be reached.
     pub fn parse(text: &str) -> Result<Self, ExerciseError> {
         let whole = |reason: &str| ExerciseError { line: 0, reason: reason.to_owned() };
         if text.len() > LARGEST {
@@ -83,7 +83,7 @@ impl Exercise {
         }
     }
 
-    /// The solution; empty if the file has none.
+    /// The solution as programs of blocks; empty if the file has none.
     #[must_use]
     pub fn solution(&self) -> Vec<SolutionPart> {
         parts(&self.solution)

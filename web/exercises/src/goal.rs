@@ -1,21 +1,21 @@
-//! What has to be reached.
+//! The goals of an exercise.
 
 use serde::Deserialize;
 
 use crate::path::MOST_POINTS;
 use crate::text::Text;
 
-/// By default a tip is at a point within this distance, in mm.
+/// The default of `within` for a tip: its largest distance from the point, in mm.
 const TIP_WITHIN: f64 = 10.0;
-/// By default a tip is on a path within this distance, in mm.
+/// The default of `within` for a path: the largest distance of the tip from the path, in mm.
 const PATH_WITHIN: f64 = 8.0;
-/// By default a joint is at an angle within this, in degrees.
+/// The default of `within` for a joint: its largest difference from the angle, in degrees.
 const JOINT_WITHIN: f64 = 2.0;
 
-/// By default a thing is at a place within this distance, in mm.
+/// The default of `within` for a thing: its largest distance from the position, in mm.
 const THING_WITHIN: f64 = 15.0;
 
-/// A goal in a file: one of the five kinds.
+/// A goal in a file. The members that are present determine which of the five kinds it is.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct GoalInFile {
@@ -40,16 +40,16 @@ pub enum Goal {
         text: Text,
         /// The point: x, y, z in mm.
         tip: [f64; 3],
-        /// How near, in mm.
+        /// The largest distance from the point, in mm.
         within: f64,
     },
-    /// The tip goes along straight lines from point to point, without leaving them.
+    /// The tip follows straight lines from point to point. If it leaves the path, it has to begin again.
     Path {
         /// The goal in words.
         text: Text,
-        /// The points: x, y, z in mm.
+        /// From 2 to 100 points: x, y, z in mm.
         path: Vec<[f64; 3]>,
-        /// How near to the lines, in mm.
+        /// The largest distance from the path, in mm.
         within: f64,
     },
     /// A joint comes to rest at an angle.
@@ -58,23 +58,23 @@ pub enum Goal {
         text: Text,
         /// The joint, from 1 to 7.
         joint: u8,
-        /// The angle.
+        /// The angle, from 0 to 180 degrees.
         degrees: f64,
-        /// How near, in degrees.
+        /// The largest difference from the angle, in degrees.
         within: f64,
     },
-    /// A thing on the table stands at a place, and the arm does not carry it.
+    /// A thing on the table rests at a position, and the arm does not carry it.
     Thing {
         /// The goal in words.
         text: Text,
         /// Its name in the scene.
         thing: String,
-        /// Where its middle has to be: x, y, z in mm.
+        /// The position of its middle: x, y, z in mm.
         at: [f64; 3],
-        /// How near, in mm.
+        /// The largest distance from that position, in mm.
         within: f64,
     },
-    /// A joint is blocked by an obstacle.
+    /// An obstacle blocks a joint (D27).
     Blocked {
         /// The goal in words.
         text: Text,
@@ -122,7 +122,7 @@ impl Goal {
         }
     }
 
-    /// Why it can never be reached.
+    /// The reason why the goal can never be reached, in English; `None` if it can be reached.
     pub(crate) fn fault(&self) -> Option<&'static str> {
         let (within, is_possible, fault) = match self {
             Self::Tip { within, .. } | Self::Thing { within, .. } => (*within, true, ""),

@@ -1,9 +1,9 @@
-//! Exercises for learners: without a browser, an arm, input or output, or a clock.
+//! Exercises for learners. This crate needs no browser, arm or clock, and does no input or output.
 //!
 //! ```text
-//!   text file ──▶ Exercise ──▶ Attempt ◀── Observation: what the arm measures, some times a second
+//!   text file ──▶ Exercise ──▶ Attempt ◀── Observation: what the arm measures, several times a second
 //!                    │            └──▶ the goals that are reached
-//!                    └──▶ SolutionPart: a program of blocks, or an obstacle taken away
+//!                    └──▶ SolutionPart: a program of blocks, or the removal of obstacles
 //! ```
 
 #![forbid(unsafe_code)]

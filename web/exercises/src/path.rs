@@ -1,20 +1,22 @@
-//! How far a tip has followed a path.
+//! Checks whether the tip follows a path.
 
-/// The most points of a path.
+/// The largest number of points of a path.
 pub(crate) const MOST_POINTS: usize = 100;
-/// Checkpoints on the path are this far apart, and so are the places of the tip between two observations, in mm.
+/// The largest distance of neighbouring checkpoints on the path, and of the positions that are interpolated between two
+/// observations of the tip, in mm.
 const STEP: f64 = 2.0;
-/// The most places between two observations. A tip that leaps further was not observed on its way.
+/// The largest number of steps between two observations, which makes 100 mm. After a longer distance the path between the two
+/// observations is unknown, and the tip begins again.
 const MOST_STEPS: u32 = 50;
 
 type Point = [f64; 3];
 
-/// A tip on its way along a path. It has to pass all checkpoints in their order; if it leaves the path, it begins anew.
+/// The progress of a tip along a path. The tip has to pass all checkpoints in order. If it leaves the path, it begins again.
 #[derive(Clone, Debug)]
 pub(crate) struct PathProgress {
     checkpoints: Vec<Point>,
     within: f64,
-    /// The checkpoints that were passed.
+    /// The number of checkpoints that the tip has passed.
     passed: usize,
     last: Option<Point>,
 }
@@ -28,7 +30,7 @@ impl PathProgress {
         Self { checkpoints, within, passed: 0, last: None }
     }
 
-    /// Takes the place of the tip; `None` if it is not measured. Returns whether the path is complete.
+    /// Takes the position of the tip; `None` begins the path again, because it is not measured. Returns true at the end.
     pub(crate) fn observe(&mut self, tip: Option<Point>) -> bool {
         let Some(tip) = tip else {
             self.passed = 0;
@@ -47,7 +49,7 @@ impl PathProgress {
         let is_near = |point: &Point| distance(*point, place) <= self.within;
         let ahead = self.checkpoints.iter().skip(self.passed).take_while(|point| is_near(point)).count();
         self.passed += ahead;
-        // Between two lines at a corner the tip is near to the last checkpoint that it passed.
+        // A tip that cuts a corner stays near the last checkpoint that it passed.
         let is_on_path = self.checkpoints.iter().take(self.passed).next_back().is_some_and(is_near);
         if !is_on_path {
             self.passed = 0;
@@ -56,7 +58,7 @@ impl PathProgress {
     }
 }
 
-/// Places on the way from one point to another, without the first and with the last.
+/// Interpolated positions from one point to another, without the first and with the last.
 fn between(from: Point, to: Point) -> Vec<Point> {
     let steps =
         (1..MOST_STEPS * 100).find(|steps| distance(from, to) <= STEP * f64::from(*steps)).unwrap_or(1);

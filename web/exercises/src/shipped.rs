@@ -13,7 +13,7 @@ const FILES: [&str; 8] = [
     include_str!("../shipped/stack.json"),
 ];
 
-/// The exercises that ship, the easiest first.
+/// The shipped exercises, the easiest first.
 #[must_use]
 pub fn shipped() -> Vec<Exercise> {
     FILES.iter().filter_map(|text| Exercise::parse(text).ok()).collect()

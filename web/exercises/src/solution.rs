@@ -1,4 +1,4 @@
-//! The solution of an exercise: steps in its file, as programs of blocks.
+//! The solution of an exercise: converts the steps in its file to programs of blocks.
 
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -7,21 +7,21 @@ use serde_json::{Value, json};
 #[derive(Clone, Debug, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub(crate) enum Step {
-    /// Joint, degrees, degrees per second.
+    /// Moves a joint: its number, 1 to 7, the angle in degrees, the speed in degrees per second.
     Joint(u8, f64, f64),
-    /// The tip to x, y, z in mm, at degrees per second, the tool down.
+    /// Moves the tip, with the tool down: x, y, z in mm, the speed of the joints in degrees per second.
     Tip(f64, f64, f64, f64),
-    /// The tip along a straight line to x, y, z in mm, at mm per second, the tool down.
+    /// Moves the tip along a straight line, with the tool down: x, y, z in mm, the speed of the tip in mm per second.
     Line(f64, f64, f64, f64),
     /// Opens the claws, or closes them.
     Grip(Claws),
-    /// Seconds.
+    /// Waits for this time, in seconds.
     Wait(f64),
-    /// The obstacles of the simulated arm are taken away, and its joints try again.
+    /// Removes the obstacles of the simulated arm, so that its joints can move again.
     Repair,
 }
 
-/// Where the claws go.
+/// The position of the claws.
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Claws {
@@ -32,13 +32,13 @@ pub(crate) enum Claws {
 /// A part of a solution.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum SolutionPart {
-    /// A program: the JSON of a workspace.
+    /// A program of blocks: the JSON of a Blockly workspace.
     Program(String),
-    /// The obstacles of the simulated arm are taken away.
+    /// Removes the obstacles of the simulated arm.
     Repair,
 }
 
-/// The steps as programs, with what happens between them.
+/// Converts steps to programs. Each [`Step::Repair`] ends the program before it.
 pub(crate) fn parts(steps: &[Step]) -> Vec<SolutionPart> {
     let groups = steps.chunk_by(|one, other| !matches!(one, Step::Repair) && !matches!(other, Step::Repair));
     groups
@@ -49,7 +49,7 @@ pub(crate) fn parts(steps: &[Step]) -> Vec<SolutionPart> {
         .collect()
 }
 
-/// The workspace of a program with these steps. Each block is nested in the one before it.
+/// The JSON of a workspace whose program has these steps. In this JSON each block contains the block below it.
 fn workspace(steps: &[Step]) -> String {
     let stack = steps.iter().enumerate().rev().fold(None, |next, (number, step)| {
         let mut block = block(step)?;
@@ -93,7 +93,7 @@ fn block(step: &Step) -> Option<Value> {
     }
 }
 
-/// A number in the socket of a block. It can be replaced by another block.
+/// A number in the input of a block, as a shadow block: the user can put another block in its place.
 fn number(value: f64) -> Value {
     json!({"shadow": {"type": "math_number", "fields": {"NUM": value}}})
 }

@@ -3,13 +3,13 @@
 use serde::Deserialize;
 use serde_json::Value;
 
-/// A text in the languages of the page. A file may have one text for all languages.
+/// A text in the languages of the page. In a file it is a string for all languages, or an object with `en` and `zh-CN`.
 #[derive(Clone, Debug, Deserialize, PartialEq, Eq)]
 #[serde(try_from = "Value")]
 pub enum Text {
-    /// For all languages.
+    /// The same text for all languages.
     One(String),
-    /// English, and Simplified Chinese.
+    /// One text for each language.
     Each {
         /// English.
         en: String,
@@ -32,7 +32,7 @@ impl TryFrom<Value> for Text {
 }
 
 impl Text {
-    /// The text in the language of a tag, `en` or `zh-CN`.
+    /// The text in the language of this tag: `zh-CN`, or English for any other tag.
     #[must_use]
     pub fn of(&self, tag: &str) -> &str {
         match self {

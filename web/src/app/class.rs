@@ -1,4 +1,5 @@
-//! A pupil's tab in a class: joins it, tells it how the arm does, stops with all others, and drives the real arm while it has it.
+//! A pupil's tab in a class: joins the class, reports the state of the arm, stops when the teacher stops all arms, and drives the
+//! class's real arm while the teacher lends it to this pupil.
 
 use classroom::message::Refusal;
 use classroom::{Goals, LeaseEnd, LentArm, ToPupil};
@@ -17,15 +18,15 @@ use crate::program::ProgramRun;
 use crate::source::LineState;
 use crate::source::socket::SocketSource;
 
-/// Time between two attempts to connect again, in milliseconds.
+/// The time before another attempt to connect, in milliseconds.
 const RETRY_MS: f64 = 2_000.0;
-/// Time between two looks at the connection without a picture, in milliseconds.
+/// The period of the timer that checks the connection, also in a tab that draws no pictures, in milliseconds.
 const LOOK_MS: i32 = 1_000;
-/// How the query of an address begins that leads to a class.
+/// The beginning of the query in the address of a class.
 const QUERY: &str = "?class";
 
 impl App {
-    /// Joins the class of the address, if it has one.
+    /// Opens the panel of the class if the page's address leads to one. Joins at once if this tab was in the class before.
     pub(super) fn open_class(&mut self) {
         let query = web_sys::window().and_then(|window| window.location().search().ok());
         let Some(query) = query.filter(|query| query.starts_with(QUERY)) else { return };
@@ -34,7 +35,7 @@ impl App {
         let code = code.unwrap_or_else(|| kept("class-code"));
         self.dom.set_hidden("class", false);
         self.class = Some(ClassTab::default());
-        // Without the timer the page looks with each picture only.
+        // If there is no timer, the page still checks the connection with each picture.
         let _ = look_without_pictures();
         for (id, value) in [("class-code", &code), ("class-name", &kept("class-name"))] {
             if let Ok(field) = self.dom.get::<HtmlInputElement>(id) {
@@ -46,7 +47,7 @@ impl App {
         }
     }
 
-    /// Does what a button asks for. Returns whether it is one of the class.
+    /// Carries out the action of a button. Returns false if the action does not belong to the class.
     pub(super) fn act_on_class(&mut self, action: &str) -> bool {
         match action {
             "join-class" => self.join_class(),
@@ -82,7 +83,7 @@ impl App {
         self.show_membership("class-joining");
     }
 
-    /// Shows the fields for the name again.
+    /// Leaves the class, and shows the fields for the name and the code again.
     fn leave_class(&mut self) {
         self.end_real_arm(None);
         if let Some(class) = &mut self.class {
@@ -100,7 +101,7 @@ impl App {
         self.dom.set_hidden("class-there", false);
     }
 
-    /// With each picture, and once a second: connects again, and says that the arm has stopped.
+    /// Checks the connections, reconnects, and confirms a stop. Called with each picture, and once a second by a timer.
     pub(super) fn class_on(&mut self, time: f64) {
         let Some(class) = &mut self.class else { return };
         if class.is_lost(time) {
@@ -145,7 +146,7 @@ impl App {
         }
     }
 
-    /// A message came.
+    /// Handles a message of the class.
     fn hear_class(&mut self, text: &str) {
         let Some(class) = &mut self.class else { return };
         class.hear();
@@ -188,7 +189,7 @@ impl App {
         }));
     }
 
-    /// The teacher stops all: at once, and not with the next picture, which a tab in the background never draws.
+    /// Handles the teacher's stop at once, not with the next picture: a tab in the background draws none.
     fn stop_for_teacher(&mut self) {
         let run = self.programs.run.as_ref();
         let block = run.and_then(ProgramRun::block).map(ToString::to_string);
@@ -205,7 +206,7 @@ impl App {
         }
     }
 
-    /// Tells the class that the arm has stopped, once it has.
+    /// Sends the confirmation of the teacher's stop when the arm has stopped.
     fn confirm_stop(&mut self) {
         let progress = self.client.stop_progress();
         let Some(class) = &mut self.class else { return };
@@ -215,7 +216,7 @@ impl App {
         }
     }
 
-    /// Tells the class how the arm does.
+    /// Sends the class a report of the arm's state.
     fn tell_class(&self) {
         let activity = match (&self.programs.run, &self.player, &self.park) {
             (Some(_), ..) => Activity::Program,
@@ -234,7 +235,7 @@ impl App {
         }
     }
 
-    /// The class tells who has the real arm.
+    /// Handles the news of who has the class's real arm. Begins or ends to drive it.
     fn show_real_arm(&mut self, arm: Option<LentArm>, over: Option<LeaseEnd>) {
         let text = arm.as_ref().map_or(String::new(), |arm| {
             let time = format!("{}:{:02}", arm.seconds / 60, arm.seconds % 60);
@@ -250,7 +251,7 @@ impl App {
         let (was_own, is_own) = (is_own(&class.arm), is_own(&arm));
         class.arm = arm;
         match (was_own, is_own, over) {
-            // Given again: the server ended the connection of the lease before.
+            // The teacher gave the arm to this pupil again: the server closed the connection of the earlier lease.
             (false, true, _) | (true, true, Some(_)) => self.begin_real_arm(),
             (true, false, over) => self.end_real_arm(Some(match over {
                 Some(LeaseEnd::Time) => "arm-over-time",
@@ -262,7 +263,7 @@ impl App {
         }
     }
 
-    /// The page drives the real arm from now on. Its simulated arm stands still meanwhile.
+    /// Begins to drive the class's real arm. The simulated arm is set aside, and its time stands still.
     fn begin_real_arm(&mut self) {
         self.stop();
         self.carry_out_stop();
@@ -274,7 +275,7 @@ impl App {
         self.dom.notice(self.language.text("arm-begins"));
     }
 
-    /// Connects to the real arm again if only this connection has ended, until the class says that another one has the arm.
+    /// Reconnects to the real arm if the connection was lost while this pupil still has the arm.
     fn reconnect_real_arm(&mut self, time: f64) {
         let is_driven = self.set_aside.is_some() && self.dom.choice("source") == "server";
         let is_closed = is_driven && matches!(self.line_state(), LineState::Closed(_));
@@ -289,7 +290,7 @@ impl App {
         }
     }
 
-    /// The page has its simulated arm again. `text`: why.
+    /// Returns to the simulated arm. `text` is the name of the text that gives the reason; `None` shows no notice.
     fn end_real_arm(&mut self, text: Option<&'static str>) {
         self.dom.set_text("class-arm", "");
         self.dom.set_hidden("stop-class-arm", true);
@@ -304,7 +305,7 @@ impl App {
     }
 }
 
-/// Lets the browser call us also in a tab in the background, which gets no pictures.
+/// Starts a timer that calls [`App::class_on`], because a tab in the background draws no pictures.
 fn look_without_pictures() -> Result<(), JsValue> {
     let window = web_sys::window().ok_or("no window")?;
     let look = Closure::<dyn FnMut()>::new(|| {

@@ -1,5 +1,5 @@
-//! The WebSocket of a class: messages as text. The browser calls as soon as one comes, also in a tab in the background, which gets
-//! no pictures.
+//! The WebSocket of a class, with text messages. The browser calls the handler when a message arrives, also in a tab in the
+//! background, which draws no pictures.
 
 use std::cell::Cell;
 use std::rc::Rc;
@@ -42,12 +42,12 @@ impl ClassSocket {
         Ok(Self { socket, is_closed, _opened: opened, _message: message, _closed: closed })
     }
 
-    /// Has it ended, or did it never begin?
+    /// Has the connection ended, or did it fail to open?
     pub(super) fn is_closed(&self) -> bool {
         self.is_closed.get()
     }
 
-    /// Sends a message. Returns whether the socket took it. A failure closes the socket.
+    /// Sends a message. Returns false if the socket is not open or did not accept the message.
     pub(super) fn send(&self, text: &str) -> bool {
         self.socket.ready_state() == WebSocket::OPEN && self.socket.send_with_str(text).is_ok()
     }
@@ -58,7 +58,7 @@ impl Drop for ClassSocket {
         self.socket.set_onopen(None);
         self.socket.set_onmessage(None);
         self.socket.set_onclose(None);
-        // It may be closed already.
+        // Ignore the error of a socket that is closed already.
         let _ = self.socket.close();
     }
 }

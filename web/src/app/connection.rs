@@ -1,4 +1,4 @@
-//! Which arm the page has, and what becomes of it: it is chosen, its server ends, or lets the page only watch.
+//! The page's connection to an arm: how the user chooses it, how it ends, and a server that lets the page only watch.
 
 use host_link::sharing::SharingState;
 use wasm_bindgen::JsValue;
@@ -11,13 +11,14 @@ use crate::source::LineState;
 use crate::source::serial::SerialSource;
 use crate::source::socket::SocketSource;
 
-/// Everything that moves an arm.
+/// The selectors of all controls that move an arm.
 const DRIVING: &str = "#stop, [data-action=stop], #joints input, #tip-x, #tip-y, #tip-z, #joint-speed, \
      [data-action=motors], [data-action=home], [data-action=park], [data-action=grip], [data-action=pump], \
      [data-action=run], [data-action=step], [data-action=play], [data-register]";
 
 impl App {
-    /// Shows the arm behind the server if the opened address has its token, or else the simulated one.
+    /// Connects to the arm behind the server if the page's address has a token, or else to a simulated arm. Shows the tour on the
+    /// first visit.
     pub(super) fn show_first_arm(&mut self) {
         let query = web_sys::window().and_then(|window| window.location().search().ok());
         if query.is_some_and(|query| query.contains("token=")) {
@@ -51,7 +52,10 @@ impl App {
         }
     }
 
-    /// The arm at the server: in a class the real one, while this tab has it.
+    /// Connects to the arm behind the server. In a class that is the real arm.
+    ///
+    /// # Errors
+    /// The browser refuses the address, or another pupil has the real arm.
     fn server_arm(&self) -> Result<SocketSource, JsValue> {
         match &self.class {
             None => SocketSource::connect(),
@@ -59,14 +63,14 @@ impl App {
         }
     }
 
-    /// Tells once that the connection has ended, and what to do. A new server has another token, so the page does not look for it.
+    /// Shows once that the connection has ended, and what to do. The page does not reconnect: a new server has another token.
     pub(super) fn tell_end_of_line(&mut self) {
         let LineState::Closed(reason) = self.line_state() else { return };
         if std::mem::replace(&mut self.is_end_told, true) {
             return;
         }
         let text = match (self.dom.choice("source") == "server", self.client.rounds()) {
-            // A class tells by itself what becomes of its arm.
+            // In a class, the messages of the class explain the end.
             (true, _) if self.class.is_some() => return,
             (true, 0) => "no-server",
             (true, _) => "server-ended",
@@ -75,12 +79,12 @@ impl App {
         self.dom.notice(format!("{} {reason}", self.language.text(text)).trim_end());
     }
 
-    /// True if nothing that this page writes reaches the arm.
+    /// True if the server is read-only: it discards the writes of this page.
     pub(super) fn only_watches(&self) -> bool {
         SharingState::of(self.client.registers()).is_some_and(|sharing| sharing.is_read_only)
     }
 
-    /// As [`Self::only_watches`], for a person who wants to move or stop the arm.
+    /// As [`Self::only_watches`], but also shows a notice. Called before the page moves or stops the arm.
     pub(super) fn refuses_to_drive(&self) -> bool {
         let only_watches = self.only_watches();
         if only_watches {
@@ -89,13 +93,13 @@ impl App {
         only_watches
     }
 
-    /// Switches the controls off while the server lets nobody write.
+    /// Disables the controls while the server is read-only.
     pub(super) fn show_watching(&mut self) {
         let is_watching = self.only_watches();
         if !is_watching && !self.are_controls_off {
             return;
         }
-        // The table of registers gets more of them.
+        // Repeated with each picture, because the table of registers may have new controls.
         for control in self.dom.all(DRIVING) {
             if is_watching {
                 set_attribute(&control, "disabled", "");

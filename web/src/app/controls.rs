@@ -1,4 +1,4 @@
-//! Controls beside the sliders: numbers for the joints and the tip, home, claw, pump, speed, and the sides of the camera.
+//! The controls other than sliders: numbers for the joints and the tip, home, claw, pump, speed, and the view of the camera.
 
 use glam::Vec3;
 use sevenbot::map::{SPEED, TARGET_POSITION, VACUUM_PUMP};
@@ -15,10 +15,10 @@ use crate::scene::{Preset, Refusal, wish};
 const CLAW: u8 = 7;
 
 impl App {
-    /// Does what a button asks for. Other actions do nothing.
+    /// Carries out the action of a button. An unknown action has no effect.
     pub(super) fn control(&mut self, action: &str, value: &str) {
         match action {
-            // As `sevenbot home`.
+            // The same pose as `sevenbot home`.
             "home" => self.go(TARGET_POSITION.default_bytes().map(f32::from)),
             "grip" => self.send_joint(CLAW, value.parse().unwrap_or_default()),
             "pump" => {
@@ -49,7 +49,7 @@ impl App {
         }
     }
 
-    /// Sends a joint to the number that a person typed.
+    /// Sends a joint to the angle that the user typed.
     pub(super) fn type_joint(&mut self, element: &Element) {
         let Some(field) = element.dyn_ref::<HtmlInputElement>() else { return };
         let attribute = |name| field.get_attribute(name).and_then(|text| text.parse::<u8>().ok());
@@ -62,13 +62,13 @@ impl App {
             None => {
                 let text = self.language.text("out-of-range");
                 self.dom.notice(&format!("{text} 0 – {highest}°"));
-                // Shows the target again.
+                // Without the focus, the field shows the target again.
                 let _ = field.blur();
             }
         }
     }
 
-    /// Sends the tip to the numbers that a person typed. The tool keeps its direction.
+    /// Sends the tip to the position that the user typed. The tool keeps its direction.
     pub(super) fn type_tip(&mut self) {
         let typed = TIP_FIELDS.map(|id| self.dom.get(id).ok().as_ref().and_then(number));
         let [Some(x), Some(y), Some(z)] = typed else {
@@ -83,7 +83,7 @@ impl App {
         }
     }
 
-    /// Sends the arm to these angles in degrees, if the guard of the workspace allows the way.
+    /// Sends the arm to these angles in degrees, if the guard of the workspace allows the path.
     fn go(&mut self, angles: [f32; 7]) {
         match self.drag_tip(angles) {
             Some(why) => self.refuse_way(why),

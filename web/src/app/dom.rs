@@ -5,7 +5,7 @@ use web_sys::{Document, Element, HtmlCanvasElement, HtmlElement, HtmlInputElemen
 
 use crate::texts::Language;
 
-/// The page.
+/// The document of the page.
 #[derive(Clone)]
 pub(super) struct Dom(pub(super) Document);
 
@@ -40,7 +40,7 @@ impl Dom {
         }
     }
 
-    /// Sets a text, if it is another one. A screen reader reads a live text only when it changes.
+    /// Sets a text only if it differs, because a screen reader announces a live region on each change.
     pub(super) fn set_text(&self, id: &str, text: &str) {
         if let Some(element) = self.element(id) {
             set_text(&element, text);
@@ -53,14 +53,14 @@ impl Dom {
         }
     }
 
-    /// A new element in `parent`.
+    /// Appends a new element to `parent`.
     pub(super) fn add(&self, parent: &Element, kind: &str) -> Result<Element, JsValue> {
         let element = self.0.create_element(kind)?;
         parent.append_child(&element)?;
         Ok(element)
     }
 
-    /// Marks one button of a group as pressed: all have the same action, and this one has this value.
+    /// Marks one button of a group as pressed. All buttons of a group have the same action; the pressed one has this value.
     pub(super) fn press(&self, action: &str, value: &str) {
         for button in self.all(&format!("[data-action={action}]")) {
             let is_pressed = button.get_attribute("data-value").as_deref() == Some(value);
@@ -91,32 +91,32 @@ impl Dom {
         }
     }
 
-    /// Says something that a person should know now.
+    /// Shows a notice.
     pub(super) fn notice(&self, text: &str) {
         self.set_text("notice", text);
         self.set_hidden("notice-bar", false);
     }
 
-    /// Says why there is no picture of the arm. The rest of the page works.
+    /// Shows a notice with the reason why there is no picture of the arm. The rest of the page works.
     pub(super) fn no_picture(&self, language: Language, reason: &JsValue) {
         let reason = reason.as_string().unwrap_or_else(|| format!("{reason:?}"));
         self.notice(&format!("{} {reason}", language.text("no-picture")));
     }
 
-    /// Takes the last notice back.
+    /// Removes the notice.
     pub(super) fn end_notice(&self) {
         self.set_hidden("notice-bar", true);
         self.set_text("notice", "");
     }
 
-    /// Takes this notice back, if no other one was given since.
+    /// Removes the notice if it still has this text.
     pub(super) fn end_notice_of(&self, text: &str) {
         if self.element("notice").and_then(|notice| notice.text_content()).as_deref() == Some(text) {
             self.end_notice();
         }
     }
 
-    /// Is this element the one with the keyboard's focus?
+    /// Does this element have the keyboard's focus?
     pub(super) fn has_focus(&self, element: &Element) -> bool {
         self.0.active_element().is_some_and(|active| active == *element)
     }
@@ -130,12 +130,12 @@ pub(super) fn set_text(element: &Element, text: &str) {
 
 pub(super) fn set_attribute(element: &Element, name: &str, value: &str) {
     if element.get_attribute(name).as_deref() != Some(value) {
-        // Only a malformed name is refused.
+        // Only a malformed name is an error.
         let _ = element.set_attribute(name, value);
     }
 }
 
-/// The value of a slider or an input.
+/// The number in a slider or an input; `None` if it holds no number.
 pub(super) fn number(input: &HtmlInputElement) -> Option<f32> {
     input.value().parse().ok()
 }

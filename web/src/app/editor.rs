@@ -1,4 +1,4 @@
-//! The editor of block programs, a script that is loaded when it is first needed: `web/block-editor`.
+//! Calls the editor of block programs in `web/block-editor`, a script that the page loads when it first needs it.
 
 use js_sys::{Array, Function, Object, Promise, Reflect};
 use wasm_bindgen::prelude::Closure;
@@ -8,20 +8,20 @@ use web_sys::Element;
 use super::dom::Dom;
 use super::page::{App, with_app};
 
-/// Its file, beside the page.
+/// The file of the script, in the folder of the page.
 const FILE: &str = "programs.js";
-/// A page in one file has the script as the text of this element.
+/// The id of the element that contains the text of the script, on a page in one file.
 const TEXT_OF_SCRIPT: &str = "programs";
 
-/// The element that loads it.
+/// The id of the element that loads the script.
 const SCRIPT: &str = "editor-script";
 
-/// The editor. Its calls do nothing before it is loaded.
+/// The editor. Before it is loaded, calls have no effect.
 #[derive(Clone, Copy)]
 pub(super) struct Editor;
 
 impl Editor {
-    /// Loads the script if it is neither there nor on its way, and calls `loaded` then, or `failed`. After a failure the next
+    /// Loads the script, unless it is loaded or being loaded. Calls `loaded` afterwards, or `failed`. After a failure the next
     /// call tries again.
     pub(super) fn load(self, dom: &Dom, loaded: fn(&mut App), failed: fn(&mut App)) -> Result<(), JsValue> {
         if object().is_some() || dom.element(SCRIPT).is_some() {
@@ -36,7 +36,7 @@ impl Editor {
         if let Some(text) = dom.element(TEXT_OF_SCRIPT) {
             script.set_text_content(text.text_content().as_deref());
             head.append_child(&script)?;
-            // The page is busy now.
+            // The script runs at once, but `with_app` cannot borrow the page here. So call `loaded` later.
             let window = web_sys::window().ok_or("no window")?;
             window.set_timeout_with_callback(call.unchecked_ref())?;
         } else {
@@ -53,12 +53,12 @@ impl Editor {
         Ok(())
     }
 
-    /// Is the script there?
+    /// Is the script loaded?
     pub(super) fn is_loaded(self) -> bool {
         object().is_some()
     }
 
-    /// Shows it in an element. `changed` is called after each edit of the program.
+    /// Shows the editor in an element, in the language of this tag. Calls `changed` after each edit of the program.
     pub(super) fn open(self, element: &Element, language: &str, changed: fn(&mut App)) {
         let changed = Closure::<dyn FnMut()>::new(move || {
             with_app(changed);
@@ -66,27 +66,27 @@ impl Editor {
         call("open", &[element.into(), language.into(), changed.into_js_value()]);
     }
 
-    /// The program.
+    /// The program as the JSON of a Blockly workspace; `None` before the editor is open.
     pub(super) fn text(self) -> Option<String> {
         call("text", &[])?.as_string()
     }
 
-    /// Shows a program. Returns why it is none, or an empty text.
+    /// Shows a program. Returns an empty text, or the error if the text is no program: then the last program stays.
     pub(super) fn show(self, program: &str, can_undo: bool) -> String {
         call("load", &[program.into(), can_undo.into()]).and_then(|why| why.as_string()).unwrap_or_default()
     }
 
-    /// Lights a block, or none.
+    /// Lights this block, and no other.
     pub(super) fn light(self, block: Option<&str>) {
         call("light", &[block.into()]);
     }
 
-    /// Shows at a block what is wrong, or at none.
+    /// Shows a warning at this block, and removes all others.
     pub(super) fn warn(self, block: Option<&str>, text: &str) {
         call("warn", &[block.into(), text.into()]);
     }
 
-    /// Adds a pose at the end of the program.
+    /// Adds a pose, in degrees, at the end of the program.
     pub(super) fn add_pose(self, degrees: [f64; 7]) {
         let angles: Array = degrees.iter().map(|&angle| JsValue::from(angle)).collect();
         call("addPose", &[angles.into()]);
@@ -97,12 +97,12 @@ impl Editor {
         call("copy", &[text.into()]);
     }
 
-    /// The letters of a program for an address.
+    /// Compresses a program to letters for an address. The promise gives a string.
     pub(super) fn pack(self, program: &str) -> Option<Promise> {
         call("pack", &[program.into()])?.dyn_into().ok()
     }
 
-    /// The program of the letters of an address; an empty text if it is none.
+    /// Decodes the letters of an address to a program. The promise gives a string, which is empty if the letters hold no program.
     pub(super) fn unpack(self, letters: &str) -> Option<Promise> {
         call("unpack", &[letters.into()])?.dyn_into().ok()
     }

@@ -1,4 +1,4 @@
-//! What a person does: clicks, keys, sliders, the pointer on the picture, files.
+//! Handles the events of the user: clicks, keys, sliders, fields and files.
 
 use arm_sim::scene::Scene;
 use sevenbot::map::{FINE_TARGET, MOTOR_STATE, TARGET_POSITION, motor_state};
@@ -18,17 +18,17 @@ use crate::arm_state::target_frame;
 use crate::plots::Quantity;
 use crate::texts::Language;
 
-/// The texts of the tour, in their order. The last one is for a real arm.
+/// The names of the texts of the tour, in order. The last one is for a real arm.
 pub(super) const TOUR: [&str; 5] = ["tour-1", "tour-2", "tour-3", "tour-4", "tour-5"];
 
-/// Listens to everything that a person can do.
+/// Installs the handlers of all events.
 pub(super) fn listen(dom: &Dom) -> Result<(), JsValue> {
     let root = dom.0.document_element().ok_or("no document")?;
     on(&root, "click", |app, _: &Event, event| app.clicked(event))?;
     on(&root, "input", |app, _: &Event, event| app.slid(event))?;
     on(&root, "change", |app, _: &Event, event| app.changed(event))?;
     on_first(&root, "keydown", |app, key: &KeyboardEvent, event| app.key(key, event))?;
-    // Some browsers click a button when the space bar is released.
+    // Some browsers click the focused button when the space bar is released.
     on(&root, "keyup", |_, key: &KeyboardEvent, event| {
         if key.key() == " " {
             event.prevent_default();
@@ -112,7 +112,7 @@ impl App {
             return;
         }
         let now = self.now();
-        // A target would be one point of the stream of a movement, and the next point would lead back.
+        // End a movement first: its stream would take a new target as one point, and its next point would lead back.
         let moves = [MOTOR_STATE, TARGET_POSITION, FINE_TARGET].iter().any(|row| row.holds(address));
         if moves {
             self.hide_time_line();
@@ -121,13 +121,13 @@ impl App {
         self.client.write(now, address, values);
     }
 
-    /// Where the wall is, in degrees.
+    /// The angle of the simulated wall, in degrees. 60 if the field holds no valid angle.
     fn wall_angle(&self) -> f32 {
         let field = self.dom.get::<HtmlInputElement>("wall-at").ok();
         field.as_ref().and_then(number).filter(|degrees| (0.0..=180.0).contains(degrees)).unwrap_or(60.0)
     }
 
-    /// Takes the faults of a simulated arm away, and lets joints that were blocked or have let go try again (D27, D28).
+    /// Removes the faults of a simulated arm. Then makes joints try again that are blocked or let go (D27, D28).
     fn repair(&mut self) {
         self.act_on_simulation("clear");
         let state = self.client.state();
@@ -170,7 +170,7 @@ impl App {
         else {
             return;
         };
-        // A number is sent when it is complete.
+        // The `change` event sends a typed number when it is complete.
         if slider.type_() == "number" {
             return;
         }
@@ -179,7 +179,7 @@ impl App {
         }
         let joint = slider.get_attribute("data-joint").and_then(|joint| joint.parse().ok());
         if let Some((joint, degrees)) = joint.zip(number(&slider)) {
-            // The round that is on its way may be older than this target.
+            // The current round of reads may be older than this target. So ignore its targets.
             self.slid_round = self.client.rounds() + 2;
             self.send_joint(joint, degrees);
         }
@@ -223,7 +223,7 @@ impl App {
             Ok(bytes) => self.write(address, &bytes),
             Err(why) => self.dom.notice(&format!("{} {why}", self.language.text("bad-value"))),
         }
-        // Shows the value of the arm again.
+        // Without the focus, the field shows the value of the arm again.
         let _ = input.blur();
     }
 
@@ -231,7 +231,8 @@ impl App {
         let target = event.target().and_then(|target| target.dyn_into::<Element>().ok());
         let kind = target.as_ref().map(Element::tag_name).unwrap_or_default();
         if key.key() == " " {
-            // Also on buttons, where the space bar would press them: a stop works from everywhere. A name may have a space.
+            // The space bar stops everywhere. On a button it must not press the button, too. In the field for a name it also
+            // types a space.
             if target.as_ref().is_none_or(|target| target.id() != "class-name") {
                 event.prevent_default();
             }
@@ -245,12 +246,12 @@ impl App {
         if key.key() == "Escape" {
             self.end_tour();
         }
-        // The Enter that ends the input of Chinese joins nothing.
+        // An Enter that confirms Chinese input in an input method must not join the class.
         let is_typed = key.key() == "Enter" && !key.is_composing();
         if is_typed && target.as_ref().is_some_and(|target| target.id().starts_with("class-")) {
             self.act_on_class("join-class");
         }
-        // The same number again is no change. A joint that was blocked is told to try again with it.
+        // Enter sends an unchanged number again, so that a blocked joint tries again. There is no `change` event for it.
         if key.key() == "Enter"
             && let Some(field) = target.filter(|target| target.id().starts_with("target-"))
         {
@@ -280,11 +281,11 @@ impl App {
     }
 }
 
-/// The action of the simulation that breaks a servo, or puts something in the way of its joint.
+/// The action of the simulation that injects a fault into a servo, or puts an obstacle at `wall` degrees in the way of its joint.
 fn break_action(joint: &str, kind: &str, wall: f32) -> String {
     match kind {
         "wall" => format!("fault {joint}=wall={wall}"),
-        // 500 millinewton metres for each degree.
+        // The stiffness: 500 mN·m per degree.
         "soft" => format!("fault {joint}=wall={wall}/500"),
         _ => match kind.strip_prefix("trip") {
             Some(alarm) => format!("trip {joint}{alarm}"),

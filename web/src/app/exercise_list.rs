@@ -1,4 +1,4 @@
-//! What the page has of exercises.
+//! The state of the page for exercises.
 
 use exercises::{Attempt, Exercise};
 
@@ -6,7 +6,7 @@ use exercises::{Attempt, Exercise};
 #[derive(Default)]
 pub(super) struct Exercises {
     pub(super) is_open: bool,
-    /// Those that ship, and those that were opened from files. Empty until they are first shown.
+    /// The shipped exercises, and those that were opened from files. Empty until they are first shown.
     pub(super) all: Vec<Exercise>,
     pub(super) chosen: usize,
     pub(super) attempt: Option<Attempt>,
@@ -18,12 +18,12 @@ impl Exercises {
         self.all.get(self.chosen)
     }
 
-    /// Chooses an exercise, which is not begun.
+    /// Chooses an exercise by its index in `all`, without an attempt.
     pub(super) fn choose(&mut self, index: usize) {
         (self.chosen, self.attempt, self.shown_hints) = (index, None, 0);
     }
 
-    /// Another arm: what was reached with the last one does not count.
+    /// Ends the attempt, because the page changes to another arm.
     pub(super) fn end(&mut self) {
         self.attempt = None;
     }

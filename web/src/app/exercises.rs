@@ -1,4 +1,4 @@
-//! Exercises: chosen, begun, watched while the arm moves, and their results saved.
+//! Exercises: chooses and begins them, observes the arm, and saves the results.
 
 use arm_sim::Action;
 use exercises::{Attempt, Exercise, SolutionPart, shipped};
@@ -13,7 +13,7 @@ use super::page::{App, Line};
 use crate::exercise::{observation, set_up};
 
 impl App {
-    /// Does what a button asks for. Returns whether it is one of exercises.
+    /// Carries out the action of a button. Returns false if the action does not belong to exercises.
     pub(super) fn act_on_exercise(&mut self, action: &str) -> bool {
         match action {
             "exercises" => self.toggle_exercises(),
@@ -42,13 +42,13 @@ impl App {
         self.show_exercise();
     }
 
-    /// A person chose another exercise.
+    /// Handles the choice of another exercise.
     pub(super) fn choose_exercise(&mut self) {
         self.exercises.choose(self.dom.choice("exercise-choice").parse().unwrap_or(0));
         self.show_exercise();
     }
 
-    /// A file with an exercise was opened.
+    /// Opens the text of a file with an exercise, and chooses the exercise.
     pub(super) fn open_exercise(&mut self, text: String) {
         match Exercise::parse(&text) {
             Ok(exercise) => {
@@ -61,7 +61,7 @@ impl App {
         }
     }
 
-    /// Sets the exercise up, and watches the arm from now on.
+    /// Begins an attempt: sets the exercise up, and observes the arm from now on.
     fn begin_exercise(&mut self) {
         let Some(exercise) = self.exercises.exercise() else { return };
         let attempt = Attempt::new(exercise);
@@ -78,7 +78,7 @@ impl App {
         self.show_exercise();
     }
 
-    /// Tells the exercise where the arm is.
+    /// Passes the new registers to the attempt.
     pub(super) fn observe_exercise(&mut self, now: Instant) {
         let seen = observation(now, self.client.registers(), self.world());
         let Some(attempt) = &mut self.exercises.attempt else { return };
@@ -87,7 +87,7 @@ impl App {
         }
     }
 
-    /// Shows the program that solves the exercise, up to where something else has to be done.
+    /// Shows the first program of the solution in the editor. A solution may continue with a repair and further programs.
     fn show_solution(&mut self) {
         let solution = self.exercises.exercise().map(Exercise::solution).unwrap_or_default();
         match solution.into_iter().find_map(|part| match part {
@@ -99,7 +99,7 @@ impl App {
         }
     }
 
-    /// Saves what was reached as a text.
+    /// Saves the reached goals and the time as a text file.
     fn save_result(&self) {
         let (Some(exercise), Some(attempt)) = (self.exercises.exercise(), &self.exercises.attempt) else {
             return self.dom.notice(self.language.text("exercise-not-begun"));
@@ -125,9 +125,9 @@ impl App {
         }
     }
 
-    /// Shows the exercise in the language of the page, and what is reached.
+    /// Shows the exercise and its reached goals, in the language of the page.
     pub(super) fn show_exercise(&self) {
-        // Only a page without the elements fails.
+        // It fails only if the page lacks an element.
         let _ = self.try_show_exercise();
     }
 
@@ -149,7 +149,7 @@ impl App {
     }
 }
 
-/// The goals, each with a mark.
+/// The lines of the goals in the language of a tag, each with a mark whether it is reached.
 fn lines(exercise: &Exercise, attempt: Option<&Attempt>, tag: &str) -> impl Iterator<Item = String> {
     let reached = attempt.map(|attempt| attempt.reached().collect::<Vec<_>>()).unwrap_or_default();
     exercise.goals.iter().enumerate().map(move |(index, goal)| {
@@ -158,7 +158,7 @@ fn lines(exercise: &Exercise, attempt: Option<&Attempt>, tag: &str) -> impl Iter
     })
 }
 
-/// Gives a list these texts.
+/// Fills a list with one element of this kind for each text. Keeps existing elements.
 fn fill(dom: &Dom, id: &str, kind: &str, texts: impl Iterator<Item = String>) -> Result<(), JsValue> {
     let list: Element = dom.get(id)?;
     let texts: Vec<_> = texts.collect();

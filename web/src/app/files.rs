@@ -1,4 +1,4 @@
-//! Files that a person saves and opens.
+//! Files that the user saves and opens.
 
 use wasm_bindgen::JsCast;
 use wasm_bindgen_futures::{JsFuture, spawn_local};
@@ -7,7 +7,7 @@ use web_sys::{Blob, Element, HtmlAnchorElement, HtmlInputElement, Url};
 use super::dom::Dom;
 use super::page::{App, with_app};
 
-/// Lets the browser save a text as a file.
+/// Saves a text as a download with this name.
 pub(super) fn save(dom: &Dom, name: &str, text: &str) {
     let parts = js_sys::Array::of1(&text.into());
     let address =
@@ -18,15 +18,15 @@ pub(super) fn save(dom: &Dom, name: &str, text: &str) {
         link.set_download(name);
         link.click();
     }
-    // The browser has its own reference by now.
+    // The download has its own reference by now.
     let _ = Url::revoke_object_url(&address);
 }
 
-/// Reads the file that a person chose.
+/// Reads the file that the user chose, and then calls `then` with its text. The text is empty if the file cannot be read.
 pub(super) fn read(element: &Element, then: fn(&mut App, String)) {
     let Some(input) = element.dyn_ref::<HtmlInputElement>() else { return };
     let Some(file) = input.files().and_then(|files| files.get(0)) else { return };
-    // So that the same file can be chosen again after a change.
+    // Reset the field: otherwise choosing the same file again, after an edit, causes no event.
     input.set_value("");
     spawn_local(async move {
         let text =

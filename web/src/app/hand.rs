@@ -1,4 +1,4 @@
-//! The pointer on the picture: a hand that drags a joint, the tip or the camera.
+//! Handles the pointer on the picture: drags a joint, the tip or the camera.
 
 use arm_sim::Action;
 use motion_core::calibration::{MicroDegrees, counts_from_angle};
@@ -12,7 +12,7 @@ use super::page::{App, Line, on};
 use crate::arm_state::{breach_on_way, breach_text};
 use crate::scene::{Button, Refusal, Scene, SceneEvent, Unreachable};
 
-/// Listens to pointers and the wheel.
+/// Installs the handlers of pointers, touches and the wheel.
 pub(super) fn listen(dom: &Dom) -> Result<(), JsValue> {
     let canvas: Element = dom.get("scene")?;
     on(&canvas, "pointerdown", |app, pointer: &PointerEvent, _| app.pointer_down(pointer))?;
@@ -34,7 +34,7 @@ pub(super) fn listen(dom: &Dom) -> Result<(), JsValue> {
         let event = app.scene.as_mut().and_then(Scene::pointer_left);
         app.scene_event(event);
     })?;
-    // Above the arm a finger moves it, elsewhere the page; two fingers zoom.
+    // A finger on the arm moves the arm, a finger elsewhere scrolls the page. Two fingers zoom the picture.
     on(&canvas, "touchstart", |app, touch: &TouchEvent, event| {
         if app.takes_touch(touch) {
             event.prevent_default();
@@ -58,7 +58,7 @@ fn place(pointer: &PointerEvent) -> [f32; 2] {
 }
 
 impl App {
-    /// Is this touch for the arm?
+    /// Does the picture handle this touch, instead of scrolling the page?
     fn takes_touch(&self, event: &TouchEvent) -> bool {
         let touches = event.touches();
         let (Some(touch), Ok(canvas), Some(scene)) = (touches.get(0), self.dom.canvas("scene"), &self.scene)
@@ -75,7 +75,7 @@ impl App {
         let angles = self.client.state().angles();
         let button = if pointer.button() == 0 { Button::Primary } else { Button::Secondary };
         if let Ok(canvas) = self.dom.canvas("scene") {
-            // The drag goes on where the pointer leaves the picture. A pointer that is gone already needs none.
+            // With the capture, a drag continues outside the picture. Ignore the error of a pointer that is gone already.
             let _ = canvas.set_pointer_capture(pointer.pointer_id());
         }
         let event = self
@@ -107,7 +107,8 @@ impl App {
         }
     }
 
-    /// Sends the arm to a pose of a dragged tip. Returns the text that says why not, if the way there is not allowed.
+    /// Sends the arm to a pose in degrees, if the guard of the workspace allows the path. If not, returns the name of the text
+    /// that gives the reason.
     pub(super) fn drag_tip(&mut self, angles: [f32; 7]) -> Option<&'static str> {
         let breach = breach_on_way(self.client.registers(), angles);
         if breach.is_none() {
@@ -116,7 +117,7 @@ impl App {
         breach.map(|breach| breach_text(&breach))
     }
 
-    /// Moves a joint by its motor. A limp joint of a simulated arm is moved by a hand.
+    /// Moves a dragged joint: with its motor, or by a simulated hand if the motors of a simulated arm are off.
     fn drag_joint(&mut self, joint: u8, degrees: f32) {
         let is_driven = self.client.state().motor_state == motor_state::SERVO;
         let (Line::Simulated(source), Some(named), false) = (&mut self.line, Joint::new(joint), is_driven)
@@ -127,6 +128,7 @@ impl App {
         self.hand = Some(joint);
     }
 
+    /// Sends the targets of all joints, in degrees: in one frame if the arm has the extended block, or else one by one.
     pub(super) fn send_pose(&mut self, angles: [f32; 7]) {
         let values: Vec<u8> = angles
             .iter()

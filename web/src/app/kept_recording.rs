@@ -1,4 +1,4 @@
-//! The recording of the page, which the browser keeps over a reload.
+//! The recording of the page, which the browser's storage keeps across a reload.
 
 use std::time::Duration;
 
@@ -9,21 +9,22 @@ use super::storage;
 /// Its name in the browser's storage.
 const KEPT: &str = "recording";
 
-/// The recording that the page has.
+/// The recording of the page: recorded, or opened from a file.
 pub(super) struct KeptRecording {
     pub(super) text: String,
-    /// The number of its moments, and the time of the last one.
+    /// The number of moments.
     pub(super) moments: usize,
+    /// The time of the last moment.
     pub(super) length: Duration,
 }
 
 impl KeptRecording {
-    /// The recording of the page before it was loaded again.
+    /// Loads the recording from the browser's storage.
     pub(super) fn of_storage() -> Option<Self> {
         storage::load(KEPT).and_then(|text| Self::parse(text).ok())
     }
 
-    /// Keeps it over a reload.
+    /// Saves the recording in the browser's storage.
     pub(super) fn store(&self) {
         storage::save(KEPT, &self.text);
     }

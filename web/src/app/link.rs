@@ -1,4 +1,4 @@
-//! A program in the address of the page: made, and opened.
+//! Links: makes an address that contains a program, and opens the program of an address.
 
 use wasm_bindgen::prelude::Closure;
 use wasm_bindgen::{JsCast, JsValue};
@@ -8,10 +8,10 @@ use web_sys::{Event, HtmlInputElement};
 use super::editor::Editor;
 use super::page::{App, with_app};
 
-/// How the part of an address begins that holds a program.
+/// The beginning of the fragment of an address with a program.
 const FRAGMENT: &str = "#program=";
 
-/// Shows the program of the address when the address changes.
+/// Installs a handler that opens the program of the address when the address changes.
 pub(super) fn listen() -> Result<(), JsValue> {
     let window = web_sys::window().ok_or("no window")?;
     let changed = Closure::<dyn FnMut(Event)>::new(|_| {
@@ -23,7 +23,7 @@ pub(super) fn listen() -> Result<(), JsValue> {
 }
 
 impl App {
-    /// Makes an address with the program in it.
+    /// Makes an address that contains the program, shows it, and copies it to the clipboard.
     pub(super) fn share(&mut self) {
         let Some(letters) = Editor.pack(&self.programs.text) else { return };
         spawn_local(async move {
@@ -34,7 +34,7 @@ impl App {
 
     fn show_link(&self, letters: &str) {
         let Some(location) = web_sys::window().map(|window| window.location()) else { return };
-        // Without the rest of the address: it has the token of a server.
+        // Omit the query of the address: it may contain the token of a server.
         let page = location.origin().unwrap_or_default() + &location.pathname().unwrap_or_default();
         let link = format!("{page}{FRAGMENT}{letters}");
         if let Ok(field) = self.dom.get::<HtmlInputElement>("program-link") {
@@ -45,19 +45,19 @@ impl App {
         Editor.copy(&link);
     }
 
-    /// Opens the program of the address, if it has one.
+    /// Opens the program of the page's address, if it contains one. Loads the editor first, if necessary.
     pub(super) fn open_link(&mut self) {
         let Some(window) = web_sys::window() else { return };
         let fragment = window.location().hash().unwrap_or_default();
         let Some(letters) = fragment.strip_prefix(FRAGMENT) else { return };
         if !Editor.is_loaded() {
-            // The editor comes back here when it is loaded.
+            // After the editor is loaded, `show_editor` calls this again.
             if !self.programs.is_open {
                 self.toggle_programs();
             }
             return;
         }
-        // A reload shows the program as it was edited since.
+        // Remove the fragment, so that a reload shows the edited program, not the one of the link.
         let address = window.location().pathname().unwrap_or_default()
             + &window.location().search().unwrap_or_default();
         if let Ok(history) = window.history() {

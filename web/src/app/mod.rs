@@ -1,4 +1,4 @@
-//! The page in a browser: connects sources, client, scene and panels.
+//! The page in a browser: connects the sources, the client, the scene and the panels.
 //!
 //! ```text
 //!   source ──▶ client ──▶ ArmState ──▶ scene, panels
@@ -70,7 +70,7 @@ pub fn start() -> Result<(), JsValue> {
     request_frames()
 }
 
-/// Lets the browser call us before each picture.
+/// Asks the browser to call [`App::frame`] before each picture, from now on.
 fn request_frames() -> Result<(), JsValue> {
     type Callback = Closure<dyn FnMut(f64)>;
     let callback: Rc<RefCell<Option<Callback>>> = Rc::default();
@@ -78,7 +78,7 @@ fn request_frames() -> Result<(), JsValue> {
     *callback.borrow_mut() = Some(Closure::new(move |time| {
         with_app(|app| app.frame(time));
         if let Some(callback) = again.borrow().as_ref() {
-            // The window is there: it has just called.
+            // This cannot fail: the window exists, because it made this call.
             let _ = request_frame(callback);
         }
     }));

@@ -1,4 +1,4 @@
-//! What moves the arm by itself: a park or a movement that is played goes on, and one of these or a program ends. One moves at a time.
+//! Parks and played movements: begins, continues and ends them. Only one park, movement or program moves the arm at a time.
 
 use host_link::sharing::{DrivenBy, SharingState};
 use protocol_core::time::Instant;
@@ -12,8 +12,8 @@ use crate::stop::StopProgress;
 use crate::words;
 
 impl App {
-    /// Ends what moves the arm: a park, a movement that is played, or a program. Returns the registers before it: the arm has their
-    /// speeds and times again soon.
+    /// Ends the park, movement or program in progress. Returns the registers from before it, whose speeds and times it restores;
+    /// `None` if there was none.
     pub(super) fn end_movement(&mut self) -> Option<Snapshot> {
         let now = self.now();
         if let Some(park) = self.take_park() {
@@ -27,19 +27,21 @@ impl App {
         self.end_program()
     }
 
-    /// The park in progress, which ends, and its notice with it.
+    /// Takes the park in progress, and removes its notice.
     fn take_park(&mut self) -> Option<Park> {
         let park = self.park.take()?;
         self.dom.end_notice_of(self.language.text("parking"));
         Some(park)
     }
 
-    /// Ends what moves the arm now. Returns the registers with the speeds and times of before that.
+    /// Ends the park, movement or program in progress. Returns the registers with the speeds and times to restore later: those
+    /// from before it, or the present ones.
     pub(super) fn registers_before_movement(&mut self) -> Snapshot {
         self.end_movement().unwrap_or_else(|| self.client.registers().clone())
     }
 
-    /// Is a stop on its way? It gives the joints other speeds until it is confirmed, so nothing that restores the present ones begins.
+    /// Is a stop in progress? Until it is confirmed, the joints have temporary speeds. Nothing may begin that would restore these
+    /// later. Shows a notice if so.
     pub(super) fn is_stopping(&self) -> bool {
         let is_stopping = self.client.stop_progress() == StopProgress::Verifying;
         if is_stopping {
@@ -58,7 +60,7 @@ impl App {
         self.dom.notice(self.language.text("parking"));
     }
 
-    /// Goes on with parking.
+    /// Continues a park.
     pub(super) fn park_on(&mut self, now: Instant) {
         let Some(mut park) = self.park.take() else { return };
         match park.poll(now, &mut self.client) {
@@ -68,7 +70,7 @@ impl App {
         }
     }
 
-    /// Goes on with a movement.
+    /// Continues a played movement.
     pub(super) fn play_on(&mut self, now: Instant) {
         let Some(mut player) = self.player.take() else { return };
         match player.poll(now, &mut self.client) {
@@ -96,15 +98,15 @@ impl App {
         }
     }
 
-    /// Before the line to the arm ends: what moves the arm ends, and joints that are on their way hold. Those that another program
-    /// moves go on. Nothing can confirm it any more, so the speeds follow at once.
+    /// Prepares the end of the line to the arm: ends the park, movement or program in progress, and makes moving joints hold.
+    /// Joints that another program moves continue. The page cannot confirm the hold any more, so it restores the speeds at once.
     pub(super) fn leave_arm(&mut self) {
         let is_own = self.programs.run.is_some() || self.player.is_some() || self.park.is_some();
         let before = self.registers_before_movement();
         let is_of_another = SharingState::of(self.client.registers())
             .is_some_and(|sharing| sharing.driven_by == DrivenBy::Another);
         let moves = is_own || (self.client.state().moving != 0 && !is_of_another);
-        // A stop was written already, and holds the joints with other speeds.
+        // If a stop is in progress, its frames already hold the joints, with temporary speeds.
         if moves && self.client.stop_progress() != StopProgress::Verifying {
             let bytes = self.client.hold_and_leave(self.now(), before.joints(&SPEED));
             self.send(&bytes);

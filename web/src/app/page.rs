@@ -1,4 +1,4 @@
-//! The page as a value: the arm that it has, and what passes between them.
+//! The state of the page, and the exchange of bytes with its arm.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -29,19 +29,18 @@ use crate::stop::StopProgress;
 use crate::texts::Language;
 use crate::words;
 
-/// Longer pauses of the browser, as in a tab in the background, let no more virtual time pass: 100 ms.
+/// The most virtual time at speed 1 between two pictures, in milliseconds, also after a longer pause of the browser.
 const LONGEST_FRAME_MS: f64 = 100.0;
-/// At high speed the client takes part this often, in milliseconds of virtual time: well within the watchdog of a movement that is
-/// played.
+/// The longest virtual time between two polls of the client, in milliseconds: well within the watchdog of a played movement.
 const STEP_MS: f64 = 20.0;
-/// How long the simulation may compute in each frame, in milliseconds, so that 30 pictures a second remain.
+/// The processor time of the simulation for each picture, in milliseconds. It allows 30 pictures per second.
 const FRAME_BUDGET_MS: f64 = 24.0;
-/// A stop of a simulated arm gets this many steps at once: it holds after some, or something is wrong with it.
+/// The most steps that a simulated arm gets at once to confirm a stop. A working arm needs fewer.
 const STEPS_OF_STOP: u32 = 50;
-/// How long plots reach back, in seconds.
+/// The time span of the plots, in seconds.
 const PLOT_SECONDS: f64 = 10.0;
 
-/// Where the arm is.
+/// The connection to the arm.
 pub(super) enum Line {
     Simulated(Box<SimulatedSource>),
     Remote(Box<dyn Source>),
@@ -56,14 +55,14 @@ impl Line {
     }
 }
 
-/// The page.
+/// The state of the page.
 pub(super) struct App {
     pub(super) dom: Dom,
     pub(super) line: Line,
     pub(super) client: Client,
-    /// A person knows that the connection has ended.
+    /// The notice that the connection has ended was shown.
     pub(super) is_end_told: bool,
-    /// The controls are switched off, because the server lets nobody write.
+    /// The controls are disabled, because the server is read-only.
     pub(super) are_controls_off: bool,
     /// `None` where the browser has no WebGL2.
     pub(super) scene: Option<Scene>,
@@ -71,18 +70,19 @@ pub(super) struct App {
     pub(super) history: History,
     pub(super) quantity: Quantity,
     pub(super) language: Language,
-    /// Of virtual time; 0 is a pause.
+    /// Virtual time per real time of a simulated arm; 0 is a pause.
     pub(super) speed: f64,
     /// The time of the last frame, in the browser's milliseconds.
     pub(super) last_frame: f64,
+    /// The last round of reads that was handled.
     pub(super) shown_round: u64,
-    /// Before this round the arm may not have taken what a slider was set to.
+    /// Before this round of reads, the registers may not show the target that a slider or field has set.
     pub(super) slid_round: u64,
     pub(super) frames: u32,
     pub(super) hovered: Option<Part>,
-    /// Where the pointer wants the tip although it cannot go there, and the name of the text that says why.
+    /// The position of a dragged tip that the arm cannot reach, in mm, and the name of the text that gives the reason.
     pub(super) unreachable: Option<(Vec3, &'static str)>,
-    /// A joint of a limp arm that the pointer holds.
+    /// The joint of a limp simulated arm that the pointer holds.
     pub(super) hand: Option<u8>,
     pub(super) recorder: Option<Recorder>,
     pub(super) park: Option<Park>,
@@ -94,16 +94,16 @@ pub(super) struct App {
     pub(super) tour_step: usize,
     /// `None` outside a class.
     pub(super) class: Option<ClassTab>,
-    /// The simulated arm, while the page drives the class's real one.
+    /// The simulated arm and its client, while the page drives the class's real arm.
     pub(super) set_aside: Option<(Line, Client)>,
 }
 
 thread_local! {
-    /// The page is a single one. Handlers of the browser need it after `start` has returned.
+    /// The only page. Global, because the browser calls its handlers after `start` has returned.
     static APP: RefCell<Option<Rc<RefCell<App>>>> = const { RefCell::new(None) };
 }
 
-/// Does something with the page, unless it is busy: a handler never runs inside another.
+/// Calls `act` with the page. `None` if there is no page, or if it is borrowed: a handler never runs inside another one.
 pub(super) fn with_app<T>(act: impl FnOnce(&mut App) -> T) -> Option<T> {
     let app = APP.with_borrow(Clone::clone)?;
     let mut app = app.try_borrow_mut().ok()?;
@@ -119,7 +119,7 @@ pub(super) fn on<E: JsCast>(
     add_listener(target, kind, act, false)
 }
 
-/// As [`on`], before the elements within this one get the event.
+/// As [`on`], but handles the event before the elements inside this one.
 pub(super) fn on_first<E: JsCast>(
     target: &Element,
     kind: &str,
@@ -144,7 +144,8 @@ fn add_listener<E: JsCast>(
     Ok(())
 }
 
-/// The plot is drawn by the processor: a software renderer of the graphics processor takes seconds for it while the page scrolls.
+/// The context of the plot. `willReadFrequently` makes the browser draw it without the graphics processor: where that is emulated
+/// in software, drawing takes seconds while the page scrolls.
 fn plot_context(dom: &Dom) -> Result<CanvasRenderingContext2d, JsValue> {
     let options = js_sys::Object::new();
     js_sys::Reflect::set(&options, &"willReadFrequently".into(), &true.into())?;
@@ -158,7 +159,7 @@ pub(super) fn browser_now() -> f64 {
 }
 
 impl App {
-    /// Makes the page, for [`with_app`].
+    /// Creates the page, and makes it available to [`with_app`].
     pub(super) fn start(dom: Dom) -> Result<(), JsValue> {
         let app = Self::new(dom)?;
         APP.set(Some(Rc::new(RefCell::new(app))));
@@ -206,7 +207,7 @@ impl App {
         })
     }
 
-    /// The clock of the arm: virtual for a simulated one.
+    /// The time of the arm's clock: virtual for a simulated arm, the browser's clock for others.
     pub(super) fn now(&self) -> Instant {
         match &self.line {
             Line::Simulated(source) => source.now(),
@@ -214,12 +215,12 @@ impl App {
         }
     }
 
-    /// Before each picture: bytes, time, then the picture.
+    /// Called before each picture: exchanges bytes, lets virtual time pass, and then draws the picture.
     pub(super) fn frame(&mut self, time: f64) {
         let elapsed = (time - self.last_frame).clamp(0.0, LONGEST_FRAME_MS);
         self.last_frame = time;
         let until = browser_now() + FRAME_BUDGET_MS;
-        // A reply that came since the last picture is not late, however slow the pictures are.
+        // Take replies before the client checks timeouts: slow pictures must not make them late.
         self.receive();
         let mut rest = if matches!(self.line, Line::Simulated(_)) { elapsed * self.speed } else { 0.0 };
         loop {
@@ -230,7 +231,7 @@ impl App {
                 break;
             }
         }
-        // Asked here, because a call of either would load the rest of the module (`super::rest`) for the first picture.
+        // Checked here: a call of either function before the first picture would load the rest of the module (`super::rest`).
         if self.time_lines.preview.is_some() {
             self.preview_on(until);
         }
@@ -242,8 +243,8 @@ impl App {
         self.frames = self.frames.wrapping_add(1);
     }
 
-    /// Lets a stop of the arm take effect now, whenever the next picture comes: sends it, and lets a simulated arm move on until it
-    /// holds, also one whose time stands still.
+    /// Carries out a stop at once, without waiting for the next picture: sends its frames, and advances a simulated arm until it
+    /// holds, also if its time is paused.
     pub(super) fn carry_out_stop(&mut self) {
         let until = browser_now() + FRAME_BUDGET_MS;
         for _ in 0..STEPS_OF_STOP {
@@ -255,7 +256,7 @@ impl App {
         }
     }
 
-    /// Sends what is due, lets virtual time pass, and takes what the arm has sent.
+    /// Sends the frames that are due, lets this virtual time pass, in milliseconds, and takes the bytes of the arm.
     fn exchange(&mut self, virtual_ms: f64, until: f64) {
         let now = self.now();
         self.play(now);
@@ -283,7 +284,7 @@ impl App {
         self.run_on(now);
     }
 
-    /// The registers are new.
+    /// Handles a complete round of reads: passes the new registers to the exercise, the recorder and the plot.
     #[expect(clippy::cast_precision_loss, reason = "times of years are exact enough")]
     fn new_state(&mut self, now: Instant) {
         let state = self.client.state();
@@ -303,12 +304,12 @@ impl App {
         self.history.push(Sample { time, angles, loads, velocities });
     }
 
-    /// Changes to another arm: everything that belonged to the last one ends.
+    /// Changes to another arm. Ends everything that belongs to the last one.
     pub(super) fn set_line(&mut self, line: Line) {
         drop(self.swap_line((line, Client::default())));
     }
 
-    /// As [`Self::set_line`], with what is known of the arm. Returns the last one.
+    /// As [`Self::set_line`], but with the client of the arm. Returns the last line and its client.
     pub(super) fn swap_line(&mut self, line: (Line, Client)) -> (Line, Client) {
         if self.recorder.is_some() {
             self.end_recording();
@@ -327,7 +328,7 @@ impl App {
         before
     }
 
-    /// Shows no time line.
+    /// Ends a preview, and hides the time line.
     pub(super) fn hide_time_line(&mut self) {
         if self.time_lines.shown.is_some() || self.time_lines.preview.is_some() {
             self.show_time_line(None);
@@ -343,7 +344,7 @@ impl App {
     }
 }
 
-/// Converts a number that is not negative and far below the limit.
+/// Rounds a non-negative number down. Numbers out of range saturate.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
 pub(super) const fn whole(number: f64) -> u64 {
     number as u64

@@ -1,4 +1,4 @@
-//! What the page shows beside the picture of the arm.
+//! Everything that the page shows outside the picture of the arm and the plot.
 
 use std::fmt::Display;
 use std::str::FromStr;
@@ -16,15 +16,15 @@ use crate::source::LineState;
 use crate::texts::Language;
 use crate::words::{Answers, state_line};
 
-/// The highest angle of a slider, in degrees, per joint; joint 7 ends where its claw is open.
+/// The highest angle of the slider of each joint, in degrees. For joint 7 the claw is open there.
 const HIGHEST: [&str; 7] = ["180", "180", "180", "180", "180", "180", "84"];
-/// The fields with the position of the tip, in mm.
+/// The ids of the fields with the position of the tip, in mm.
 pub(super) const TIP_FIELDS: [&str; 3] = ["tip-x", "tip-y", "tip-z"];
-/// The registers of the table: all that are read.
+/// The registers in the table, without the protection block and the registers of a server.
 const SHOWN: [std::ops::RangeInclusive<u8>; 3] =
     [0..=60, 128..=EXTENDED_VERSION.address, 240..=SERVO_TEMPERATURE.address];
 
-/// Makes the elements that there are many of.
+/// Creates the repeated elements: a row with slider and field for each joint, and the joints in the list of faults.
 pub(super) fn build(dom: &Dom) -> Result<(), JsValue> {
     let joints: Element = dom.get("joints")?;
     let broken: Element = dom.get("fault-joint")?;
@@ -56,7 +56,7 @@ pub(super) fn build(dom: &Dom) -> Result<(), JsValue> {
     Ok(())
 }
 
-/// Shows the arm as it is now.
+/// Updates all panels to the present state of the arm.
 pub(super) fn show(app: &mut App, state: &ArmState) {
     app.show_watching();
     show_line(app, state);
@@ -74,7 +74,7 @@ pub(super) fn show(app: &mut App, state: &ArmState) {
     dom.press("motors", &state.motor_state.to_string());
     show_speed_and_pump(app);
     let [x, y, z] = tip(state.angles());
-    // Sliders go anywhere: this is the warning.
+    // Sliders do not check the workspace. So warn here, for the measured pose or the targets.
     let at = misplaced(state.angles()).or(misplaced(state.targets));
     let reach = app.unreachable.map(|(_, why)| why).or(at);
     let reach = reach.map_or(String::new(), |why| format!(" · {}", language.text(why)));
@@ -95,7 +95,7 @@ fn show_speed_and_pump(app: &App) {
     let (dom, registers) = (&app.dom, app.client.registers());
     dom.press("pump", &registers.byte(&VACUUM_PUMP).to_string());
     let [first, others @ ..] = registers.joints(&SPEED);
-    // Other speeds are none of the choices, and show nothing.
+    // If the joints have different speeds, show no choice.
     let is_one = others.iter().all(|&other| other == first);
     let speed = if is_one { first.to_string() } else { String::new() };
     if dom.element("joint-speed").is_some_and(|choice| !dom.has_focus(&choice)) {
@@ -103,7 +103,7 @@ fn show_speed_and_pump(app: &App) {
     }
 }
 
-/// No arm has answered yet: no value is shown.
+/// Shows all values as unknown, because no arm has answered yet.
 fn show_nothing_known(dom: &Dom, language: Language) {
     let unknown = language.text("not-measured");
     for number in 1..=7 {
@@ -114,7 +114,7 @@ fn show_nothing_known(dom: &Dom, language: Language) {
     dom.set_text("health", "");
 }
 
-/// Supply and temperature, as far as they are known, and who else moves the arm.
+/// The line with the supply voltage and the temperature, as far as they are known, and whether another program moves the arm.
 fn health(app: &App, state: &ArmState) -> String {
     let language = app.language;
     let sharing = SharingState::of(app.client.registers());
@@ -163,7 +163,7 @@ fn show_joints(dom: &Dom, language: Language, state: &ArmState) {
     }
 }
 
-/// Sets the sliders, the numbers beside them and those of the tip to the targets. `step` is what the arm can take, in degrees.
+/// Sets the sliders and the fields of the joints and the tip to the targets. `step` is their resolution in degrees.
 fn show_targets(dom: &Dom, state: &ArmState, step: &str) {
     for (number, target) in (1..).zip(state.targets) {
         for id in [format!("joint-{number}"), format!("target-{number}")] {
@@ -179,7 +179,7 @@ fn show_targets(dom: &Dom, state: &ArmState, step: &str) {
     }
 }
 
-/// Shows a number, unless a person types another one. A slider is never typed in.
+/// Sets a field or slider to a number, unless the user is typing in the field.
 fn show_number(dom: &Dom, field: &HtmlInputElement, number: impl Display + FromStr + PartialEq) {
     let is_typed = field.type_() == "number" && dom.has_focus(field);
     if !is_typed && field.value().parse().ok().as_ref() != Some(&number) {
@@ -274,7 +274,7 @@ fn is_writable(address: u8) -> bool {
     sevenbot::map::find(address).is_some_and(|row| row.access == Access::ReadWrite)
 }
 
-/// The tip of the arm in mm.
+/// Is this panel open?
 fn is_open(dom: &Dom, id: &str) -> bool {
     dom.element(id).is_some_and(|panel| panel.has_attribute("open"))
 }

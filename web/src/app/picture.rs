@@ -1,4 +1,4 @@
-//! The arm in 3D and the plot, before each picture of the browser.
+//! Draws the arm in 3D and the plot, before each picture of the browser.
 
 use arm_sim::world::World;
 use sevenbot::map::{fault, motor_state};
@@ -38,14 +38,14 @@ impl App {
         {
             self.dom.no_picture(self.language, &reason);
         }
-        // A plot is read at leisure, and costs as much time as the arm.
+        // Drawing the plot takes as much time as drawing the arm, and the plot needs fewer updates.
         if self.frames.is_multiple_of(PLOT_PERIOD) {
             self.show_plot(theme);
         }
         panels::show(self, &state);
     }
 
-    /// The room of the simulated arm.
+    /// The room of the simulated arm; `None` for a real arm, or without a room.
     pub(super) fn world(&self) -> Option<&World> {
         match &self.line {
             Line::Simulated(source) => source.simulation().plant().world(),
@@ -70,15 +70,15 @@ impl App {
         let title = format!("{} ({unit})", self.language.text(name));
         let (quantity, shown) = (self.quantity, [true; 7]);
         let plot = Plot { quantity, title: &title, seconds: "s", shown, theme, size, ratio };
-        // Only an invalid context is refused.
+        // It fails only for an invalid context.
         let _ = draw(&self.plot, &plot, &self.history);
     }
 }
 
-/// The colour of each joint: what is wrong with it comes first.
+/// The colour of each joint. A problem of the joint takes precedence over the state of the motors.
 fn colours(state: &ArmState, theme: Theme) -> [Rgb; 7] {
     let palette = theme.palette();
-    // The arm does not tell which servo reports a fault.
+    // If only the fault bit of the servo bus is set, the arm does not tell the joint. Then mark all joints.
     let is_unknown = state.faults & fault::SERVO_BUS != 0 && state.missing | state.stalled == 0;
     let faulty = if is_unknown { u8::MAX } else { state.stalled };
     std::array::from_fn(|index| {

@@ -1,4 +1,4 @@
-//! What the page has of programs.
+//! The state of the page for programs.
 
 use crate::program::ProgramRun;
 
@@ -7,12 +7,12 @@ use crate::program::ProgramRun;
 pub(super) struct Programs {
     pub(super) run: Option<ProgramRun>,
     pub(super) is_open: bool,
-    /// The program in the editor.
+    /// The program in the editor, as the JSON of a Blockly workspace.
     pub(super) text: String,
-    /// The program that is to be shown when the editor is there.
+    /// The program to open when the editor is loaded.
     pub(super) wanted: Option<String>,
-    /// The block that is lit.
+    /// The id of the lit block; empty if no block is lit.
     pub(super) lit: String,
-    /// The name of the text that says how the last run ended.
+    /// The name of the text that says how the last run ended; `None` before a run and after an edit.
     pub(super) ended: Option<&'static str>,
 }

@@ -1,4 +1,4 @@
-//! Programs of blocks: edited, kept over a reload, saved, opened, shared by a link, and run.
+//! Programs of blocks: edits, stores, saves, opens, shares and runs them.
 
 use block_programs::{Program, ProgramError, python};
 use protocol_core::time::Instant;
@@ -12,11 +12,11 @@ use super::storage;
 use crate::program::{Pace, ProgramProgress, ProgramRun};
 use crate::words;
 
-/// The name of the program in the browser's storage.
+/// The key of the program in the browser's storage.
 const KEPT: &str = "program";
 
 impl App {
-    /// Does what a button asks for. Returns whether it is one of programs.
+    /// Carries out the action of a button. Returns false if the action does not belong to programs.
     pub(super) fn act_on_program(&mut self, action: &str) -> bool {
         match action {
             "programs" => self.toggle_programs(),
@@ -59,7 +59,8 @@ impl App {
         self.dom.notice(self.language.text("no-editor"));
     }
 
-    /// The editor is there: shows it with the program of before, or with that of the address.
+    /// Shows the editor after it was loaded, with the stored program. A program in the page's address, or one that is wanted,
+    /// replaces the stored one.
     fn show_editor(&mut self) {
         let Some(element) = self.dom.element("blocks") else { return };
         Editor.open(&element, self.language.tag(), Self::program_changed);
@@ -73,7 +74,7 @@ impl App {
         }
     }
 
-    /// Opens the view of programs with this program. Undo brings the last one back.
+    /// Opens the panel of programs with this program. Undo brings the last program back.
     pub(super) fn show_in_editor(&mut self, text: String) {
         if !self.programs.is_open {
             self.toggle_programs();
@@ -85,7 +86,7 @@ impl App {
         }
     }
 
-    /// The editor in another language.
+    /// Shows the editor in the language of the page.
     pub(super) fn translate_editor(&mut self) {
         if let Some(element) = self.dom.element("blocks") {
             Editor.open(&element, self.language.tag(), Self::program_changed);
@@ -94,7 +95,7 @@ impl App {
         }
     }
 
-    /// Keeps the program, and shows it as Python or says what is missing.
+    /// Handles a change of the program: stores it, and shows it as Python, or shows its fault.
     fn program_changed(&mut self) {
         let Some(text) = Editor.text() else { return };
         storage::save(KEPT, &text);
@@ -112,7 +113,7 @@ impl App {
         self.dom.set_text("python", &shown);
     }
 
-    /// The program as Python; says why there is none.
+    /// The program as Python. If the program has a fault, shows it and returns `None`.
     fn python(&self) -> Option<String> {
         match Program::parse(&self.programs.text) {
             Ok(program) => Some(python(&program)),
@@ -129,7 +130,7 @@ impl App {
         self.dom.notice(&text);
     }
 
-    /// Begins the program, or goes on with it.
+    /// Begins the program, or continues the running one at this pace.
     fn run_program(&mut self, pace: Pace) {
         if let Some(run) = &mut self.programs.run {
             run.go_on(pace);
@@ -152,7 +153,7 @@ impl App {
         }
     }
 
-    /// Goes on with the program.
+    /// Continues the running program.
     pub(super) fn run_on(&mut self, now: Instant) {
         let Some(run) = &mut self.programs.run else { return };
         let failure = match run.poll(now, &mut self.client) {
@@ -170,7 +171,7 @@ impl App {
         }
     }
 
-    /// Lights the block that runs, and says what the program does.
+    /// Lights the block of the running program or of the time line, and shows the state of the program.
     pub(super) fn show_program(&mut self) {
         let running = self.programs.run.as_ref().and_then(ProgramRun::block).map(ToString::to_string);
         let lit = running.or_else(|| self.time_lines.block()).unwrap_or_default();
@@ -186,7 +187,8 @@ impl App {
         self.dom.set_text("program-state", doing.map_or("", |name| self.language.text(name)));
     }
 
-    /// Ends the program because something else moves the arm. Returns the registers before it.
+    /// Ends the running program, because something else is about to move the arm. Returns the registers from before it; `None` if
+    /// no program runs.
     pub(super) fn end_program(&mut self) -> Option<Snapshot> {
         let (run, now) = (self.programs.run.take()?, self.now());
         let before = run.before().clone();
@@ -195,7 +197,7 @@ impl App {
         Some(before)
     }
 
-    /// Stops the arm if a program runs. Returns whether one did.
+    /// Stops the arm and ends the program, if one runs. Returns whether one ran.
     pub(super) fn stop_program(&mut self, now: Instant) -> bool {
         let Some(run) = self.programs.run.take() else { return false };
         run.stop(now, &mut self.client);
@@ -203,7 +205,7 @@ impl App {
         true
     }
 
-    /// A file with a program was opened.
+    /// Opens the text of a program, from a file, a link or a solution.
     pub(super) fn open_program(&mut self, text: String) {
         if let Err(error) = Program::parse(&text) {
             return self.show_program_error(&ProgramError { block: None, ..error });
@@ -218,7 +220,7 @@ impl App {
     }
 }
 
-/// To two decimals, as a block shows it.
+/// Rounds to two decimals, as a block shows an angle.
 fn hundredths(degrees: f32) -> f64 {
     (f64::from(degrees) * 100.0).round() / 100.0
 }

@@ -1,4 +1,4 @@
-//! Movements: recorded, kept over a reload, opened from a file, played and saved.
+//! Movements: records, stores, opens, plays and saves them.
 
 use std::time::Duration;
 
@@ -12,7 +12,7 @@ use super::page::App;
 use crate::movement::{PlayRefusal, Player};
 use crate::recorder::Recorder;
 
-/// The longest way to the first pose of a movement, in seconds.
+/// The longest time to approach the first pose of a movement, in seconds.
 const LONGEST_APPROACH: f32 = 60.0;
 
 impl App {
@@ -74,7 +74,7 @@ impl App {
         self.dom.notice(&format!("{} {why}", self.language.text("bad-file")));
     }
 
-    /// A file with a movement was opened.
+    /// Opens the text of a file with a movement.
     pub(super) fn open_recording(&mut self, text: String) {
         match KeptRecording::parse(text) {
             Ok(recording) => self.keep(recording),

@@ -1,4 +1,4 @@
-//! The rest of the module, which the page loads after its first picture (`cargo xtask web` splits the module).
+//! Loads the rest of the WebAssembly module, which the first picture does not need. `cargo xtask web` splits the module.
 
 use core::cell::Cell;
 
@@ -10,7 +10,7 @@ thread_local! {
 
 #[wasm_bindgen]
 extern "C" {
-    /// Loads the rest unless it is there. Of `start.js`.
+    /// Loads the rest, unless it is loaded. Blocks until then. A function of `start.js`.
     #[wasm_bindgen(js_name = loadRest)]
     fn load_rest();
 }

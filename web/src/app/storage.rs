@@ -1,4 +1,5 @@
-//! What the browser keeps for this page over a reload. A browser that keeps nothing, as in a private window, is no fault.
+//! Values that the browser stores for this page across a reload. A browser that stores nothing, as in a private window,
+//! is not an error.
 
 use web_sys::Storage;
 
@@ -6,17 +7,17 @@ fn storage() -> Option<Storage> {
     web_sys::window()?.local_storage().ok()?
 }
 
-/// What was kept under this name.
+/// Loads the value with this name; `None` if there is none.
 pub(super) fn load(name: &str) -> Option<String> {
     storage()?.get_item(name).ok()?
 }
 
-/// What was kept for this tab under this name.
+/// Loads this tab's value with this name; `None` if there is none.
 pub(super) fn load_of_tab(name: &str) -> Option<String> {
     storage_of_tab()?.get_item(name).ok()?
 }
 
-/// Keeps a text for this tab: others of the same browser do not have it.
+/// Stores a value for this tab only. Other tabs of the same browser do not see it.
 pub(super) fn save_of_tab(name: &str, text: &str) {
     if let Some(storage) = storage_of_tab() {
         let _ = storage.set_item(name, text);
@@ -27,7 +28,7 @@ fn storage_of_tab() -> Option<Storage> {
     web_sys::window()?.session_storage().ok()?
 }
 
-/// Keeps a text. A full storage keeps what it had.
+/// Stores a value. If the storage is full, the old value stays.
 pub(super) fn save(name: &str, text: &str) {
     if let Some(storage) = storage() {
         let _ = storage.set_item(name, text);

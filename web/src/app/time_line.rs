@@ -1,5 +1,5 @@
-//! The time line below the picture: a recording, or the preview of a program, is looked through with a slider. The ghost in
-//! the picture shows the arm at that moment. Nothing moves.
+//! The time line below the picture: a slider to browse a recording, or the preview of a program. The ghost in the picture shows
+//! the arm at the chosen moment. The arm itself does not move.
 
 use std::time::Duration;
 
@@ -15,13 +15,13 @@ use crate::preview::{Preview, PreviewEnd};
 use crate::time_line::TimeLine;
 use crate::words;
 
-/// The step of the slider, in seconds: as in index.html.
+/// The step of the slider, in seconds: the same as in index.html.
 const STEP: f64 = 0.05;
-/// The name of the text that is shown while a program is tried.
+/// The name of the notice while a preview runs.
 const PREVIEW_RUNS: &str = "preview-runs";
 
 impl App {
-    /// Does what a button asks for. Returns whether it is one of time lines.
+    /// Carries out the action of a button. Returns false if the action does not belong to time lines.
     pub(super) fn act_on_time_line(&mut self, action: &str) -> bool {
         match action {
             "preview" => self.begin_preview(),
@@ -50,7 +50,8 @@ impl App {
         self.time_lines.preview = preview;
     }
 
-    /// The name of the text that says why there can be no preview now. It would begin with an arm that moves, or that does not.
+    /// The name of the text that says why no preview can begin now: there is no answer yet, the arm moves, its motors are off, or
+    /// a servo is silent. `None` if a preview can begin.
     fn no_preview(&self) -> Option<&'static str> {
         let is_busy = self.player.is_some() || self.park.is_some() || self.programs.run.is_some();
         let state = self.client.state();
@@ -63,21 +64,21 @@ impl App {
         }
     }
 
-    /// The program is another one now.
+    /// Hides the preview, because the program has changed.
     pub(super) fn end_preview(&mut self) {
         if self.time_lines.preview.is_some() || self.time_lines.is_preview {
             self.show_time_line(None);
         }
     }
 
-    /// The recording is another one now.
+    /// Hides the time line of a recording, because there is another recording now.
     pub(super) fn end_look(&mut self) {
         if self.time_lines.shown.is_some() && !self.time_lines.is_preview {
             self.show_time_line(None);
         }
     }
 
-    /// Goes on with a preview until the browser's clock shows this time.
+    /// Continues the preview until the browser's clock reaches `until`, in milliseconds. At the end shows its time line.
     pub(super) fn preview_on(&mut self, until: f64) {
         let Some(mut preview) = self.time_lines.preview.take() else { return };
         let Some(end) = preview.poll(|| browser_now() < until) else {
@@ -101,14 +102,14 @@ impl App {
         }
     }
 
-    /// Shows the start of a movement, or none.
+    /// Shows a time line at its start, or hides the last one. Ends a preview that runs.
     pub(super) fn show_time_line(&mut self, shown: Option<TimeLine>) {
         if self.time_lines.preview.is_some() {
             self.dom.end_notice_of(self.language.text(PREVIEW_RUNS));
         }
         self.dom.set_hidden("time-line", shown.is_none());
         if let (Some(shown), Ok(slider)) = (&shown, self.dom.get::<HtmlInputElement>("moment")) {
-            // Only whole steps can be chosen. Behind the last moment the arm stands.
+            // The slider has whole steps, so round its maximum up. `choose_moment` limits the time to the length.
             let steps = (shown.length().as_secs_f64() / STEP).ceil();
             set_attribute(&slider, "max", &format!("{:.2}", steps * STEP));
             slider.set_value("0");
@@ -117,7 +118,7 @@ impl App {
         self.say_moment();
     }
 
-    /// The slider was moved.
+    /// Handles a move of the slider.
     pub(super) fn choose_moment(&mut self) {
         let seconds = self.dom.get::<HtmlInputElement>("moment").ok().as_ref().and_then(number);
         let at = Duration::from_secs_f32(seconds.unwrap_or_default().max(0.0));

@@ -9,7 +9,7 @@ fn seconds(seconds: u64) -> Instant {
     Instant::from_micros(seconds * 1_000_000)
 }
 
-/// The registers of an arm in its standard pose, but for joint 1, whose angle is in hundredths of a degree.
+/// The registers of an arm in its standard pose, except joint 1, whose angle is given in hundredths of a degree.
 fn registers(joint_1: u16) -> Snapshot {
     let mut registers = Snapshot { address: 0, values: vec![0; 256] };
     let angles = [joint_1, 9_000, 6_500, 9_000, 9_000, 9_000, 8_000].map(u16::to_le_bytes);

@@ -1,19 +1,19 @@
-//! Axes of plots: round numbers, and the place of a value.
+//! Axes of plots: chooses round numbers, and maps values to positions.
 
-/// A range of values, with the numbers that are written at it.
+/// The range of values of an axis, and the step of its ticks.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Axis {
     /// The lowest value.
     pub low: f32,
     /// The highest value.
     pub high: f32,
-    /// Between two numbers.
+    /// The difference between two ticks.
     pub step: f32,
 }
 
 impl Axis {
-    /// An axis with zero in its middle that holds all values, and at least `least` to both sides. Its ends are
-    /// multiples of a round step, with at most `most_steps` of them.
+    /// An axis with zero in the middle, which contains all finite values and at least `-least` to `least`. Its step is round: 1,
+    /// 2 or 5 times a power of ten. Its ends are multiples of the step, with at most `most_steps` steps between them.
     #[must_use]
     pub fn around_zero(values: impl Iterator<Item = f32>, least: f32, most_steps: f32) -> Self {
         let largest = values.filter(|value| value.is_finite()).map(f32::abs).fold(least, f32::max);
@@ -22,7 +22,7 @@ impl Axis {
         Self { low: -end, high: end, step }
     }
 
-    /// The numbers at the axis, from the lowest on.
+    /// The values of the ticks, lowest first.
     pub fn ticks(&self) -> impl Iterator<Item = f32> {
         let (low, high, step) = (self.low, self.high, self.step);
         let ticks = std::iter::successors(Some(0_u8), |tick| tick.checked_add(1));
@@ -31,14 +31,14 @@ impl Axis {
             .take_while(move |value| *value <= high + step / 1e3)
     }
 
-    /// Where a value is: 0 at the low end, 1 at the high one. Values beyond an end are at it.
+    /// The position of a value on the axis: 0 at the low end, 1 at the high end. Values beyond an end are clamped to it.
     #[must_use]
     pub fn place(&self, value: f32) -> f32 {
         ((value - self.low) / (self.high - self.low)).clamp(0.0, 1.0)
     }
 }
 
-/// The smallest of 1, 2, 5 times a power of ten that is not below `least`.
+/// The smallest number of the form 1, 2 or 5 times a power of ten that is at least `least`.
 fn round_step(least: f32) -> f32 {
     let power = 10.0_f32.powf(least.max(1e-6).log10().floor());
     let factor = [1.0, 2.0, 5.0].into_iter().find(|factor| factor * power >= least * 0.999);

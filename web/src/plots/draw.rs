@@ -7,7 +7,7 @@ use super::axis::Axis;
 use super::history::{History, Quantity};
 use crate::scene::theme::{Palette, Theme};
 
-/// Room for numbers to the left and below, in CSS pixels.
+/// Margins of the plot, in CSS pixels. The numbers are to the left and below.
 const LEFT: f64 = 44.0;
 const BELOW: f64 = 20.0;
 const RIGHT: f64 = 8.0;
@@ -17,10 +17,10 @@ const TEXT: f64 = 16.0;
 const ENTRY: f64 = 34.0;
 const FONT: &str = "12px system-ui, sans-serif";
 
-/// What is drawn, and in which words.
+/// The settings of a plot.
 #[derive(Clone, Copy, Debug)]
 pub struct Plot<'a> {
-    /// What is shown.
+    /// The quantity on the vertical axis.
     pub quantity: Quantity,
     /// The name of the quantity with its unit, such as "Angle (°)".
     pub title: &'a str,
@@ -28,7 +28,7 @@ pub struct Plot<'a> {
     pub seconds: &'a str,
     /// Which of joints 1 to 7 have a line.
     pub shown: [bool; 7],
-    /// Light or dark.
+    /// The colours: for a light or a dark page.
     pub theme: Theme,
     /// Width and height of the canvas, in CSS pixels.
     pub size: [f64; 2],
@@ -36,7 +36,7 @@ pub struct Plot<'a> {
     pub ratio: f64,
 }
 
-/// The rectangle of the lines, in CSS pixels.
+/// The rectangle in which the lines are drawn, in CSS pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Area {
     left: f64,
@@ -55,7 +55,7 @@ impl Area {
     }
 }
 
-/// The height of the title with the legend for a plot of this width, in CSS pixels.
+/// The height of the title and the legend in a plot of this width, both in CSS pixels.
 #[must_use]
 pub fn legend_height(width: f64) -> f64 {
     if is_narrow(width) { 2.0 * TEXT + 12.0 } else { TEXT + 12.0 }
@@ -69,7 +69,7 @@ fn is_narrow(width: f64) -> bool {
 /// Draws a plot of the last seconds of a history.
 ///
 /// # Errors
-/// The browser's message; none is known for a valid context.
+/// The browser throws an exception. With a valid context, no such case is known.
 pub fn draw(context: &Context, plot: &Plot, history: &History) -> Result<(), JsValue> {
     let ([width, height], palette) = (plot.size, plot.theme.palette());
     context.set_transform(plot.ratio, 0.0, 0.0, plot.ratio, 0.0, 0.0)?;
@@ -91,7 +91,7 @@ pub fn draw(context: &Context, plot: &Plot, history: &History) -> Result<(), JsV
     Ok(())
 }
 
-/// Angles have a fixed axis; loads and velocities one that fits.
+/// The vertical axis: fixed for angles, fitted to the values for loads and velocities.
 fn axis_of(plot: &Plot, history: &History) -> Axis {
     let least = match plot.quantity {
         Quantity::Angle => return Axis { low: 0.0, high: 180.0, step: 45.0 },
@@ -141,7 +141,7 @@ fn rule(context: &Context, palette: &Palette, is_strong: bool, [x, y]: [f64; 2],
     context.stroke();
 }
 
-/// The title, and a short line with its number for each joint that is shown.
+/// Draws the title, and for each shown joint a short line in its colour and its number.
 fn draw_legend(context: &Context, plot: &Plot, palette: &Palette) -> Result<(), JsValue> {
     let [width, _] = plot.size;
     context.set_text_align("left");
@@ -178,7 +178,7 @@ fn draw_lines(context: &Context, plot: &Plot, area: Area, axis: &Axis, history: 
         for sample in history.samples() {
             let value = sample.values(plot.quantity).get(joint).copied().unwrap_or_default();
             let part = 1.0 - (end - sample.time) / seconds;
-            // The first one of a path moves there.
+            // On an empty path, `line_to` acts as `move_to`.
             context.line_to(area.x(part), area.y(axis, value));
         }
         context.stroke();

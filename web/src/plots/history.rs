@@ -2,12 +2,12 @@
 
 use std::collections::VecDeque;
 
-/// What a plot shows.
+/// The quantity that a plot shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
     /// Measured angle, in degrees.
     Angle,
-    /// Load, in percent of the servo's largest.
+    /// Load, in percent of the stall torque.
     Load,
     /// Velocity, in degrees per second.
     Velocity,
@@ -16,18 +16,18 @@ pub enum Quantity {
 /// The state of joints 1 to 7 at one time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sample {
-    /// In seconds, since any start.
+    /// The time in seconds, from any fixed instant.
     pub time: f64,
-    /// In degrees.
+    /// The angles in degrees.
     pub angles: [f32; 7],
-    /// In percent of the servo's largest.
+    /// The loads in percent of the stall torque, positive towards greater angles.
     pub loads: [f32; 7],
-    /// In degrees per second.
+    /// The velocities in degrees per second, positive towards greater angles.
     pub velocities: [f32; 7],
 }
 
 impl Sample {
-    /// The values of one quantity.
+    /// The values of one quantity, joint 1 first.
     #[must_use]
     pub const fn values(&self, quantity: Quantity) -> &[f32; 7] {
         match quantity {
@@ -46,7 +46,7 @@ pub struct History {
 }
 
 impl History {
-    /// The most samples that are kept: 20 seconds at 100 a second.
+    /// The largest number of samples: 20 seconds at 100 samples per second.
     pub const CAPACITY: usize = 2_000;
 
     /// An empty history that keeps samples for this many seconds.
@@ -61,8 +61,8 @@ impl History {
         self.seconds
     }
 
-    /// Adds a sample and drops those that are too old. A sample that is older than the last one begins a new history:
-    /// another source was chosen, or the simulator started again.
+    /// Adds a sample and drops those that are too old. A sample that is older than the last one clears the history first: the
+    /// clock has started again, with another source or a new simulator.
     pub fn push(&mut self, sample: Sample) {
         if self.samples.back().is_some_and(|last| last.time > sample.time) {
             self.samples.clear();

@@ -1,4 +1,4 @@
-//! What the arm does for one block, until it is done.
+//! Carries out the command of one block, until the arm has done it.
 
 use std::time::Duration;
 
@@ -22,43 +22,43 @@ use crate::confirmed::Confirmed;
 use crate::movement::{PlayProgress, PlayRefusal, Player};
 use crate::stop::since_start;
 
-/// What a program does with the arm.
+/// The current action of a program. A block may need several actions, one after the other.
 #[derive(Debug)]
 pub(super) enum Action {
     /// The program was not polled yet.
     Start,
-    /// It begins when this round was read.
+    /// Waits until this round of reads is complete.
     Beginning(u64),
     /// The next block may begin.
     Ready,
-    /// The arm has to take registers. Then comes the next action.
+    /// Waits until the arm has confirmed writes, and continues with the next action.
     Writing(Confirmed, Next),
     Moving(JointMove),
     Line(Box<Player>),
-    /// Until this time.
+    /// Waits until this time since the start of the clock.
     Waiting(Duration),
-    /// The last writes of the program.
+    /// Waits until the arm has confirmed the last writes of the program.
     Closing(Confirmed),
 }
 
-/// What comes after registers that the arm has taken.
+/// The action after the arm has confirmed writes.
 #[derive(Debug)]
 pub(super) enum Next {
     /// The block is done.
     Nothing,
-    /// Targets, after the speeds for them.
+    /// Writes targets: the confirmed writes were their speeds and times, or the type of the effector.
     Targets(FineTargets),
-    /// The joints are on their way.
+    /// Waits until the joints have arrived: the confirmed writes were their targets.
     Arrival(FineTargets),
 }
 
 impl Action {
-    /// May joints be on their way?
+    /// May this action move joints?
     pub(super) const fn may_move(&self) -> bool {
         matches!(self, Self::Writing(_, Next::Arrival(_)) | Self::Moving(_) | Self::Line(_))
     }
 
-    /// Is it done? One action may be followed by another one of the same block.
+    /// Continues the action. Returns true when the whole command is done: an action may start another one of the same command.
     pub(super) fn is_done(&mut self, now: Instant, client: &mut Client) -> Result<bool, ProgramFailure> {
         match self {
             Self::Start | Self::Beginning(_) | Self::Ready => Ok(true),
@@ -86,7 +86,7 @@ impl Action {
     }
 }
 
-/// Begins what a block wants.
+/// Begins a command of a block.
 pub(super) fn begin(command: &Command, now: Instant, client: &mut Client) -> Result<Action, ProgramFailure> {
     match command {
         Command::Wait(time) => Ok(Action::Waiting(since_start(now) + *time)),
@@ -113,7 +113,7 @@ pub(super) fn begin(command: &Command, now: Instant, client: &mut Client) -> Res
     }
 }
 
-/// Speeds and durations for the joints with a target. The targets follow when the arm has them.
+/// Writes speeds and times for the joints with a target. The targets follow when the arm has confirmed these.
 fn set_pace(targets: FineTargets, pace: Pace, now: Instant, client: &mut Client) -> Action {
     let steps = |steps: u8| targets.map(|target| target.map(|_| steps));
     let speed = pace.speed.or(pace.time.map(|_| Speed::MAXIMUM));
@@ -132,7 +132,10 @@ fn write_targets(targets: FineTargets, now: Instant, client: &mut Client) -> Act
     Action::Writing(Confirmed::write(frames, now, client), Next::Arrival(targets))
 }
 
-/// The targets for a point of the tip, if the guard of the workspace allows the way there.
+/// The targets of the joints for a point of the tip.
+///
+/// # Errors
+/// The point is out of reach, the guard of the workspace does not allow the path to it, or a joint was not measured.
 fn tip_targets(
     tip: Vector,
     tool: Vector,
@@ -155,7 +158,7 @@ fn tip_targets(
     Ok([Some(one), Some(two), Some(three), Some(four), Some(five), None, None])
 }
 
-/// Where joints 1 to 5 are.
+/// The measured angles of joints 1 to 5, in degrees.
 fn measured(registers: &Snapshot) -> Result<[f64; 5], ProgramFailure> {
     let mut angles = [0.0; 5];
     for (angle, joint) in angles.iter_mut().zip(&Health::new(registers).joints) {
@@ -164,7 +167,7 @@ fn measured(registers: &Snapshot) -> Result<[f64; 5], ProgramFailure> {
     Ok(angles)
 }
 
-/// A straight line from the present targets.
+/// Plans a straight line of the tip from the present targets.
 fn line(tip: Vector, tool: Vector, speed: f64, registers: &Snapshot) -> Result<StraightLine, ProgramFailure> {
     let is_fine = registers.has_extended_block();
     let request = StraightLineRequest {

@@ -10,25 +10,25 @@ use crate::movement::PlayFailure;
 /// Why a program ends early.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ProgramFailure {
-    /// The program is wrong.
+    /// The program itself has a fault, such as a number out of range.
     Program(ProgramError),
-    /// The arm does not carry it out.
+    /// The arm does not carry out the program, or something interrupts it.
     Arm(PlayFailure),
-    /// The tip cannot go there.
+    /// The tip cannot go to a point or along a line.
     Refused {
-        /// The name of the text that says why.
+        /// The name of the text that gives the reason in the language of the page.
         text: &'static str,
-        /// Why, and what is possible instead, in English.
+        /// The reason in English, with what is possible instead.
         details: String,
     },
-    /// The firmware of the arm does not tell this.
+    /// The firmware of the arm does not provide a value that the program reads.
     NotTold,
-    /// Joints have other targets than those of the program.
+    /// These joints have other targets than the program has written: something else moves them.
     OtherTargets(Vec<Joint>),
 }
 
 impl ProgramFailure {
-    /// The block that is wrong; `None` if it is the one that runs.
+    /// The block with the fault; `None` if the failure concerns the block that runs.
     #[must_use]
     pub fn block(&self) -> Option<&BlockId> {
         match self {

@@ -1,4 +1,4 @@
-//! Waits until joints are at their targets, as measured.
+//! Waits until joints have reached their targets, as measured.
 
 use std::time::Duration;
 
@@ -15,32 +15,35 @@ use crate::client::{BAUD, Client};
 use crate::movement::PlayFailure;
 use crate::stop::since_start;
 
-/// A move may take twice its duration, plus this.
+/// The timeout of a move is twice its expected duration, plus this.
 const MARGIN: Duration = Duration::from_secs(5);
-/// After the set-points are there, the joints have this time to settle.
+/// The joints have this time to settle after the set-points have reached the targets.
 const SETTLE_TIME: Duration = Duration::from_secs(2);
-/// A joint that is slower than this rests, in degrees per second.
+/// A joint that is slower than this is at rest, in degrees per second.
 const STILL: f32 = 1.0;
-/// The claw, which may hold something away from its target.
+/// The index of the claw's joint. A claw that holds something does not reach its target, so its target is not compared.
 const CLAW: usize = 6;
 
-/// A move whose targets the arm has.
+/// A move whose targets the arm has confirmed.
 #[derive(Debug)]
 pub(super) struct JointMove {
     targets: FineTargets,
-    /// Of the joints with a target, as [`Joint::bit`]s.
+    /// The joints with a target, as [`Joint::bit`]s.
     joints: u8,
+    /// The time of the timeout.
     end: Duration,
     watch: MoveWatch,
+    /// The round of the last registers that were checked.
     round: u64,
-    /// The arm had other targets in the last round. A stop of another program writes them, and tells of itself one round later.
+    /// The arm had other targets in the last round. They may come from a stop by another program, which the server reports up to
+    /// one round later.
     has_other_targets: bool,
-    /// Since when no set-point moves.
+    /// The time since which no set-point moves; `None` while one moves.
     resting: Option<Duration>,
 }
 
 impl JointMove {
-    /// A move to these targets, which were written at `now`.
+    /// Begins to wait at `now` for a move to these targets.
     pub(super) fn new(targets: FineTargets, now: Instant, registers: &Snapshot) -> Self {
         let with_target = Joint::ALL.into_iter().zip(&targets).filter(|(_, target)| target.is_some());
         let joints = with_target.fold(0, |bits, (joint, _)| bits | joint.bit());
@@ -57,7 +60,10 @@ impl JointMove {
         }
     }
 
-    /// Are the joints there?
+    /// Returns true when the joints have reached their targets.
+    ///
+    /// # Errors
+    /// The arm has a problem, the joints have other targets, or they did not arrive in time.
     pub(super) fn poll(&mut self, now: Instant, client: &Client) -> Result<bool, ProgramFailure> {
         if client.rounds() == self.round {
             return Ok(false);
@@ -82,7 +88,7 @@ impl JointMove {
             return Ok(true);
         }
         let since = *self.resting.get_or_insert(now);
-        // Firmware without a status block does not tell which joints move.
+        // Firmware without a status block does not report which joints move, so the timeout of the whole move applies.
         let end = if health.faults.is_some() { since + SETTLE_TIME } else { self.end };
         match (now < end, away.is_empty()) {
             (true, _) => Ok(false),
@@ -91,12 +97,12 @@ impl JointMove {
         }
     }
 
-    /// The joints that have other targets than these: something else moves them.
+    /// The joints whose targets in the registers differ from these, except the claw: something else moves them.
     fn other_targets(&self, health: &Health) -> Vec<Joint> {
         let joints = health.joints.iter().zip(&self.targets);
         let other = joints.filter(|(joint, target)| {
             let is_claw = usize::from(joint.joint.index()) == CLAW;
-            // In whole degrees where the arm has no others.
+            // An arm without the extended block has targets in whole degrees.
             let is_same = |target: &sevenbot::FineAngle| {
                 joint.target == *target || joint.target == target.nearest().into()
             };
@@ -115,7 +121,7 @@ fn not_reached(away: Vec<(Joint, u8, u8)>) -> ProgramFailure {
     ProgramFailure::Arm(PlayFailure::NotReached(away))
 }
 
-/// The duration of the slowest joint, at the speeds and times of the registers.
+/// The expected duration of the slowest joint, at the speeds and times of the registers.
 fn longest(targets: &FineTargets, registers: &Snapshot) -> Duration {
     let health = Health::new(registers);
     let moves = health.joints.iter().zip(targets).filter_map(|(joint, target)| {

@@ -1,4 +1,4 @@
-//! What the registers tell a program.
+//! Reads the sensors of a program from the registers.
 
 use block_programs::{Axis, Sensor, Value};
 use protocol_core::time::Instant;
@@ -10,7 +10,10 @@ use crate::arm_state::ArmState;
 use crate::client::BAUD;
 use crate::stop::since_start;
 
-/// Reads a sensor. What a silent servo told is old, so it is an error.
+/// Reads a sensor.
+///
+/// # Errors
+/// A servo is silent, so that its values are old, or the firmware does not provide the value.
 pub(super) fn read(sensor: Sensor, now: Instant, registers: &Snapshot) -> Result<Value, ProgramFailure> {
     MoveWatch::new(since_start(now), 0, BAUD).of_positions().registers(since_start(now), registers)?;
     let health = Health::new(registers);

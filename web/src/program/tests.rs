@@ -8,14 +8,14 @@ use crate::tab::Tab;
 use crate::texts::Language;
 use crate::words::program_failure;
 
-/// A workspace whose start is followed by this stack of blocks.
+/// A workspace with this stack of blocks below the start block.
 fn workspace(first: &str) -> String {
     format!(
         r#"{{"blocks": {{"blocks": [{{"type": "arm_start", "id": "start", "next": {{"block": {first}}}}}]}}}}"#
     )
 }
 
-/// Joint 1 goes slowly to 170 degrees, for about four seconds.
+/// A program that moves joint 1 slowly to 170 degrees, for about four seconds.
 fn long_move() -> String {
     let number =
         |number: u8| format!(r#"{{"block": {{"type": "math_number", "fields": {{"NUM": {number}}}}}}}"#);
@@ -26,7 +26,7 @@ fn long_move() -> String {
     ))
 }
 
-/// The programs in `block-programs/examples`: their workspaces, the same as Python, and where the arm is at their ends.
+/// The programs in `block-programs/examples`: the text and the path of each workspace.
 fn examples() -> Vec<(String, std::path::PathBuf)> {
     let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("block-programs/examples");
     let files = std::fs::read_dir(folder).expect("a folder").map(|entry| entry.expect("an entry").path());
@@ -34,7 +34,7 @@ fn examples() -> Vec<(String, std::path::PathBuf)> {
     workspaces.map(|path| (std::fs::read_to_string(&path).expect("a file"), path)).collect()
 }
 
-/// Compares with a committed file, or writes it if the variable `ACCEPT` is set.
+/// Compares a text with a committed file. If the environment variable `ACCEPT` is set, writes the file first.
 fn check_file(path: &std::path::Path, text: &str, is_same: impl Fn(&str) -> bool) {
     if std::env::var_os("ACCEPT").is_some() {
         std::fs::write(path, text).expect("a file");
@@ -43,7 +43,7 @@ fn check_file(path: &std::path::Path, text: &str, is_same: impl Fn(&str) -> bool
     assert!(is_same(&committed), "{}: ACCEPT=1 writes it anew:\n{text}", path.display());
 }
 
-/// `python/tests/test_block_programs.py` runs the Python and compares with the same committed angles.
+/// `python/tests/test_block_programs.py` runs the committed Python programs, and compares with the same committed angles.
 #[test]
 fn each_example_ends_where_it_did_and_is_the_committed_python() {
     let examples = examples();
@@ -91,7 +91,7 @@ fn a_program_ends_where_the_arm_does_not_carry_it_out() {
     }
 }
 
-/// The joint turns at 20 degrees/s, and would turn at 114 with the speed of before (D11).
+/// The program turns the joint at 20 degrees/s. With the restored speed the joint would continue at 114 degrees/s (D11).
 #[test]
 fn d11_a_joint_on_its_way_holds_when_another_joint_is_moved() {
     let mut tab = Tab::new();
@@ -115,7 +115,7 @@ fn d11_a_joint_on_its_way_holds_when_another_joint_is_moved() {
     assert_eq!(tab.registers(), before);
 }
 
-/// A joint that another program moves is where that one wants it, not where this one does.
+/// A joint that another program moves arrives at the target of that program, not at the one of this program.
 #[test]
 fn a_move_does_not_count_as_done_if_something_else_moves_its_joint() {
     let mut tab = Tab::new();
@@ -247,7 +247,7 @@ fn any_program() -> impl Strategy<Value = String> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
-    /// Whatever a program does, the arm holds soon after a stop, and then never moves again.
+    /// Whatever the program does, the arm holds soon after a stop and does not move again.
     #[test]
     fn after_a_stop_at_any_moment_the_arm_never_goes_on(workspace in any_program(), moment in 0_u32..900) {
         let mut tab = Tab::new();
@@ -261,7 +261,7 @@ proptest! {
             tab.pass(1);
         }
         let at_stop = tab.angles();
-        // A random target may be refused: then the program is over, and the arm stands.
+        // The arm may have refused a random target. Then the program is over, and the arm stands.
         if let Some(run) = run {
             run.stop(tab.arm.now(), &mut tab.client);
             tab.pass(40);
@@ -270,7 +270,7 @@ proptest! {
         let held = tab.angles();
         tab.pass(300);
         for ((stop, held), end) in at_stop.iter().zip(held).zip(tab.angles()) {
-            // 60 degrees/s for the time of the stop on the line.
+            // 12 degrees: the distance at 60 degrees/s while the stop is on the line.
             prop_assert!((stop - held).abs() < 12.0, "{} to {}", stop, held);
             prop_assert!((held - end).abs() < 0.7, "{} to {}", held, end);
         }

@@ -1,4 +1,4 @@
-//! The arm as the scene uses it: triangles of its bodies, where they are, and which of them a ray meets first.
+//! The geometry of the arm: the triangles of its bodies, their positions, and the first body that a ray hits.
 
 use arm_model::{Body, Mesh, poses};
 use glam::{Affine3A, Mat3A, Vec3, Vec3A};
@@ -6,7 +6,7 @@ use kinematics::Vector;
 
 use super::camera::Ray;
 
-/// Angles of joints 1 to 7 in degrees, as the registers have them.
+/// Angles of joints 1 to 7 in degrees, as in the registers.
 pub type Angles = [f32; 7];
 
 /// The number of bodies.
@@ -17,14 +17,14 @@ pub const BODIES: usize = Body::ALL.len();
 pub enum Part {
     /// The base, which no joint turns.
     Base,
-    /// The part that the joint of this number, 1 to 7, turns.
+    /// The part that this joint, 1 to 7, moves.
     Joint(u8),
     /// The marker of the tip.
     Tip,
 }
 
 impl Part {
-    /// The part that a body belongs to.
+    /// The part to which a body belongs.
     #[must_use]
     pub const fn of(body: Body) -> Self {
         match body.joint() {
@@ -34,14 +34,14 @@ impl Part {
     }
 }
 
-/// Where a ray meets the arm.
+/// The first point at which a ray hits the arm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
     /// The body.
     pub body: Body,
-    /// The point in the axes of the body, in mm.
+    /// The point in the coordinates of the body, in mm.
     pub local: Vec3,
-    /// From the origin of the ray, in mm.
+    /// The distance from the origin of the ray, in mm.
     pub distance: f32,
 }
 
@@ -64,7 +64,7 @@ impl Arm {
         &self.meshes
     }
 
-    /// The body that a ray meets first, of an arm with these angles.
+    /// The body of an arm with these angles that a ray hits first; `None` if the ray misses the arm.
     #[must_use]
     pub fn pick(&self, angles: Angles, ray: Ray) -> Option<Hit> {
         let hits =
@@ -81,7 +81,7 @@ impl Arm {
     }
 }
 
-/// From the axes of each body to the frame of the arm, in mm.
+/// For each body, the transform from its coordinates to those of the arm, in mm.
 #[must_use]
 pub fn transforms(angles: Angles) -> [(Body, Affine3A); BODIES] {
     poses(angles.map(f64::from)).map(|(body, pose)| {
@@ -92,7 +92,7 @@ pub fn transforms(angles: Angles) -> [(Body, Affine3A); BODIES] {
     })
 }
 
-/// Where a point in the axes of a body is, in the frame of the arm, in mm.
+/// Converts a point from the coordinates of a body to those of the arm, in mm.
 #[must_use]
 pub fn point_of(angles: Angles, body: Body, local: Vec3) -> Vec3 {
     let found = transforms(angles).into_iter().find(|(other, _)| *other == body);
@@ -105,28 +105,28 @@ pub fn tip_of(angles: Angles) -> Vec3 {
     point_of(angles, Body::Disc, Vec3::ZERO)
 }
 
-/// A vector of `kinematics` with single precision.
+/// Converts a vector of `kinematics` to single precision.
 #[must_use]
 #[expect(clippy::cast_possible_truncation, reason = "rounds to the nearest f32")]
 pub const fn from_vector(vector: Vector<f64>) -> Vec3 {
     Vec3::new(vector.x as f32, vector.y as f32, vector.z as f32)
 }
 
-/// A vector for `kinematics`.
+/// Converts a vector to the double precision of `kinematics`.
 #[must_use]
 pub fn to_vector(vector: Vec3) -> Vector<f64> {
     let [x, y, z] = vector.to_array().map(f64::from);
     Vector::new(x, y, z)
 }
 
-/// The distance along a ray to the first triangle that faces it.
+/// The distance along a ray to the first front-facing triangle; `None` if it hits none.
 fn first_triangle(mesh: &Mesh, ray: Ray) -> Option<f32> {
     let triangles = mesh.positions.as_chunks::<3>().0;
     let distances = triangles.iter().filter_map(|corners| distance_to(corners.map(Vec3::from), ray));
     distances.min_by(f32::total_cmp)
 }
 
-/// Möller and Trumbore: the distance along a ray to a triangle that faces it.
+/// The distance along a ray to a front-facing triangle, by the algorithm of Möller and Trumbore; `None` if the ray misses it.
 fn distance_to([a, b, c]: [Vec3; 3], ray: Ray) -> Option<f32> {
     let (one, other) = (b - a, c - a);
     let across = ray.direction.cross(other);
@@ -179,7 +179,7 @@ mod tests {
 
     #[test]
     fn the_tip_is_that_of_the_kinematics() {
-        // From the tables of the maker's own forward kinematics.
+        // A value from the tables of the maker's forward kinematics.
         let tip = tip_of([50.0, 80.0, 50.0, 50.0, 50.0, 50.0, 0.0]);
         assert!((tip - Vec3::new(167.30, 184.94, 283.34)).length() < 0.01, "{tip}");
     }

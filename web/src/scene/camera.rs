@@ -1,37 +1,37 @@
-//! The camera: it turns round a point, and maps points of the arm's frame (mm) to CSS pixels and back to rays.
+//! The camera: orbits around a point. Projects points of the arm's frame (mm) to CSS pixels, and converts pixels to rays.
 
 use glam::{Mat4, Vec2, Vec3, Vec4};
 
 /// Vertical angle of view in radians.
 const FIELD_OF_VIEW: f32 = 0.6;
-/// Depth range, in mm.
+/// The nearest and the farthest visible depth, in mm.
 const NEAR: f32 = 40.0;
 const FAR: f32 = 6_000.0;
-/// Where the page begins: the middle of the picture, and the distance to it, in mm.
+/// The initial target in the middle of the picture, and the distance to it, in mm.
 const STANDARD_TARGET: Vec3 = Vec3::new(0.0, 100.0, 95.0);
 const STANDARD_DISTANCE: f32 = 840.0;
 /// Bounds of the distance to the target, in mm.
 const DISTANCE: [f32; 2] = [250.0, 3_000.0];
-/// Bounds of the elevation, in radians: from a little below the table's plane to almost above the arm.
+/// Bounds of the elevation, in radians: from slightly below the horizontal to almost vertically above the arm.
 const ELEVATION: [f32; 2] = [-0.15, 1.55];
 /// Bounds of each coordinate of the target, in mm.
 const TARGET: [f32; 2] = [-500.0, 500.0];
-/// Radians that a drag of one CSS pixel turns the camera.
+/// The angle by which a drag of one CSS pixel turns the camera, in radians.
 const TURN_PER_PIXEL: f32 = 0.008;
 
 /// A half line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
-    /// Where it starts, in mm.
+    /// Its start, in mm.
     pub origin: Vec3,
     /// Its direction, of length 1.
     pub direction: Vec3,
 }
 
-/// A view from one side.
+/// A fixed direction of view.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Preset {
-    /// From the front right and above: where the page begins.
+    /// From the front right and above: the initial view.
     Corner,
     /// From the front: the arm looks at the camera.
     Front,
@@ -41,14 +41,14 @@ pub enum Preset {
     Top,
 }
 
-/// What the scene is seen from. Angles in radians, lengths in mm.
+/// The position and direction from which the scene is seen. Angles in radians, lengths in mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
     /// The point in the middle of the picture.
     target: Vec3,
-    /// Direction from the target to the camera seen from above: 0 along x, to the right of the arm.
+    /// The direction from the target to the camera, seen from above: 0 is along x, to the right of the arm.
     azimuth: f32,
-    /// Angle of that direction above the horizontal.
+    /// The angle of the camera above the horizontal plane through the target.
     elevation: f32,
     distance: f32,
     /// Width and height of the picture in CSS pixels.
@@ -75,7 +75,7 @@ impl Camera {
         self.size = Vec2::new(width.max(1.0), height.max(1.0));
     }
 
-    /// Goes to one of the fixed sides, with the standard distance and target.
+    /// Switches to a fixed direction, with the initial target and distance.
     pub fn look_from(&mut self, preset: Preset) {
         (self.azimuth, self.elevation) = match preset {
             Preset::Corner => (0.45, 0.42),
@@ -87,20 +87,20 @@ impl Camera {
         self.distance = STANDARD_DISTANCE;
     }
 
-    /// Turns round the target by a drag in CSS pixels: to the right turns the arm to the right.
+    /// Orbits around the target by a drag in CSS pixels. A drag to the right moves the near side of the scene to the right.
     pub fn orbit(&mut self, right: f32, down: f32) {
         self.azimuth = (self.azimuth - right * TURN_PER_PIXEL).rem_euclid(std::f32::consts::TAU);
         let [low, high] = ELEVATION;
         self.elevation = (self.elevation + down * TURN_PER_PIXEL).clamp(low, high);
     }
 
-    /// Multiplies the distance: below 1 comes nearer.
+    /// Multiplies the distance by this factor: below 1 moves the camera nearer. The distance stays within its bounds.
     pub fn zoom(&mut self, factor: f32) {
         let [low, high] = DISTANCE;
         self.distance = (self.distance * factor).clamp(low, high);
     }
 
-    /// Moves the target so that it follows a drag in CSS pixels.
+    /// Moves the target so that the scene follows a drag in CSS pixels.
     pub fn pan(&mut self, right: f32, down: f32) {
         let per_pixel = 2.0 * self.distance_for_height() * (FIELD_OF_VIEW / 2.0).tan() / self.size.y;
         let (across, up) = self.screen_axes();
@@ -109,20 +109,20 @@ impl Camera {
         self.target = target.clamp(Vec3::splat(low), Vec3::splat(high));
     }
 
-    /// The directions to the right and up in the picture.
+    /// The unit vectors to the right and up in the picture, in the arm's frame.
     #[must_use]
     pub fn screen_axes(&self) -> (Vec3, Vec3) {
         let across = Vec3::new(-self.azimuth.sin(), self.azimuth.cos(), 0.0);
         (across, self.backward().cross(across))
     }
 
-    /// Where the camera is, in mm.
+    /// The position of the camera, in mm.
     #[must_use]
     pub fn position(&self) -> Vec3 {
         self.target + self.backward() * self.distance_for_height()
     }
 
-    /// From points of the arm's frame to clip space.
+    /// The transform from the arm's frame, in mm, to clip space.
     #[must_use]
     pub fn view_projection(&self) -> Mat4 {
         let (across, up) = self.screen_axes();
@@ -132,7 +132,7 @@ impl Camera {
         perspective(FIELD_OF_VIEW, aspect) * turn * Mat4::from_translation(-self.position())
     }
 
-    /// Where a point of the arm's frame, in mm, is drawn, in CSS pixels from the top left. `None` behind the camera.
+    /// Projects a point of the arm's frame, in mm, to CSS pixels from the top left. `None` if the point is behind the camera.
     #[must_use]
     pub fn project(&self, point: Vec3) -> Option<Vec2> {
         let clip = self.view_projection() * point.extend(1.0);
@@ -153,29 +153,29 @@ impl Camera {
         Ray { origin: self.position(), direction: direction.normalize() }
     }
 
-    /// Where the half line through a pixel meets the plane through a point that faces the camera, in mm.
+    /// Intersects the half line through a pixel with the plane through a point, parallel to the screen. All in mm.
     #[must_use]
     pub fn on_facing_plane(&self, pixel: Vec2, through: Vec3) -> Vec3 {
         let (ray, back) = (self.ray(pixel), self.backward());
-        // The half line leaves the camera forward: its part along `back` is below 0 for any angle of view below 180.
+        // The ray points forward, so its component along `back` is negative. `min` keeps the divisor away from 0.
         let depth = (through - ray.origin).dot(back) / ray.direction.dot(back).min(-1e-3);
         ray.origin + ray.direction * depth
     }
 
-    /// From the target to the camera.
+    /// The unit vector from the target to the camera.
     fn backward(&self) -> Vec3 {
         let (sine, cosine) = self.azimuth.sin_cos();
         let (up, level) = self.elevation.sin_cos();
         Vec3::new(cosine * level, sine * level, up)
     }
 
-    /// The distance, larger where the picture is higher than wide (phones), so that the arm is not cut off.
+    /// The distance to the target, increased if the picture is higher than wide (phones), so that the arm is not cut off.
     fn distance_for_height(&self) -> f32 {
         self.distance * (self.size.y / self.size.x).max(1.0)
     }
 }
 
-/// The perspective of OpenGL: depth -1 to 1.
+/// The perspective projection of OpenGL, with a depth from -1 to 1.
 fn perspective(field_of_view: f32, aspect: f32) -> Mat4 {
     let scale = 1.0 / (field_of_view / 2.0).tan();
     let depth = NEAR - FAR;

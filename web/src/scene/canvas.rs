@@ -14,9 +14,9 @@ use super::pointer::{self, Button, Pointer, SceneEvent};
 use super::renderer::Renderer;
 use super::view::View;
 
-/// Of the extension `WEBGL_debug_renderer_info`: the name of the graphics processor.
+/// The parameter of the extension `WEBGL_debug_renderer_info` for the name of the graphics processor.
 const UNMASKED_RENDERER: u32 = 0x9246;
-/// Device pixels per CSS pixel on a graphics processor: the browser makes edges smooth as it fits the picture to the screen.
+/// Rendered pixels per CSS pixel on a graphics processor. The browser scales the picture to the screen, which smooths the edges.
 const SMOOTH_RATIO: f32 = 2.0;
 
 /// The arm on a canvas: picture, camera and pointers.
@@ -26,16 +26,17 @@ pub struct Scene {
     arm: Arm,
     camera: Camera,
     pointer: Pointer,
-    /// Device pixels per CSS pixel.
+    /// Rendered pixels per CSS pixel.
     ratio: f32,
     /// `None` after the browser took the graphics context away.
     renderer: Option<Renderer>,
+    /// The last picture; `None` if the next one has to be drawn in any case.
     drawn: Option<Picture>,
-    /// Set by the browser when it gives the graphics context back.
+    /// Set when the browser has restored a lost graphics context.
     is_restored: Rc<Cell<bool>>,
 }
 
-/// What a picture depends on.
+/// Everything that determines a picture: equal values give equal pictures.
 #[derive(Clone, Debug, PartialEq)]
 struct Picture {
     view: View,
@@ -47,7 +48,7 @@ impl Scene {
     /// Prepares the graphics of a canvas.
     ///
     /// # Errors
-    /// The browser has no WebGL2, or the message of its graphics driver.
+    /// The browser has no WebGL2, or the graphics driver reports an error.
     pub fn new(canvas: HtmlCanvasElement) -> Result<Self, JsValue> {
         let gl = context(&canvas)?.ok_or("this browser has no WebGL2")?;
         let ratio = pixel_ratio(&gl)?;
@@ -58,10 +59,10 @@ impl Scene {
         Ok(Self { canvas, gl, arm, camera, pointer, ratio, renderer, drawn: None, is_restored })
     }
 
-    /// Draws a view, unless the last picture was the same. True if it drew.
+    /// Draws a view, unless the last picture was the same or the graphics context is lost. Returns whether it drew.
     ///
     /// # Errors
-    /// The message of the graphics driver, where the browser took the graphics context away and gave it back.
+    /// The graphics driver reports an error after the browser has restored a lost graphics context.
     pub fn draw(&mut self, view: &View) -> Result<bool, JsValue> {
         if self.is_restored.take() {
             self.renderer = Some(Renderer::new(self.gl.clone(), &self.arm)?);
@@ -80,26 +81,26 @@ impl Scene {
         Ok(true)
     }
 
-    /// Where a point of the arm's frame, in mm, is drawn, in CSS pixels from the top left of the canvas. `None` behind the
-    /// camera.
+    /// Projects a point of the arm's frame, in mm, to CSS pixels from the top left of the canvas. `None` if the point is behind
+    /// the camera.
     #[must_use]
     pub fn project(&self, point: Vec3) -> Option<Vec2> {
         self.camera.project(point)
     }
 
-    /// What an arm with these angles has at a point of the canvas, in CSS pixels from its top left.
+    /// The part of an arm with these angles at a point of the canvas, in CSS pixels from its top left.
     #[must_use]
     pub fn pick(&self, x: f32, y: f32, angles: Angles) -> Option<Part> {
         Pointer::part_at(&self.arm, &self.camera, angles, Vec2::new(x, y))
     }
 
-    /// The camera, to read.
+    /// The camera.
     #[must_use]
     pub const fn camera(&self) -> &Camera {
         &self.camera
     }
 
-    /// The camera, to move.
+    /// The camera, so that the caller can move it.
     pub const fn camera_mut(&mut self) -> &mut Camera {
         &mut self.camera
     }
@@ -110,8 +111,8 @@ impl Scene {
         self.pointer.is_dragging()
     }
 
-    /// A pointer went down: its identifier, its position in CSS pixels from the top left of the canvas, and the measured
-    /// angles of the arm.
+    /// Handles a pointer that went down. The position is in CSS pixels from the top left of the canvas; `angles` are the measured
+    /// ones, in degrees.
     pub fn pointer_down(
         &mut self,
         id: i32,
@@ -122,33 +123,32 @@ impl Scene {
         self.pointer.down((id, Vec2::new(x, y), button), &self.arm, &self.camera, angles)
     }
 
-    /// A pointer moved.
+    /// Handles a pointer that moved, with the same parameters as [`Self::pointer_down`].
     pub fn pointer_moved(&mut self, id: i32, [x, y]: [f32; 2], angles: Angles) -> Option<SceneEvent> {
         self.pointer.moved((id, Vec2::new(x, y)), &self.arm, &mut self.camera, angles)
     }
 
-    /// A pointer went up or was cancelled.
+    /// Handles a pointer that went up or was cancelled.
     pub fn pointer_up(&mut self, id: i32) -> Option<SceneEvent> {
         self.pointer.up(id)
     }
 
-    /// A pointer that is not down left the canvas.
+    /// Handles a pointer that left the canvas without being down.
     pub fn pointer_left(&mut self) -> Option<SceneEvent> {
         self.pointer.left()
     }
 
-    /// The wheel turned by this many CSS pixels.
+    /// Zooms by a turn of the wheel, in CSS pixels; a positive number moves the camera away.
     pub fn wheel(&mut self, pixels: f32) {
         pointer::wheel(&mut self.camera, pixels);
     }
 
-    /// A key was pressed while the canvas has the focus, named as in `KeyboardEvent.key`. False if the camera knows no
-    /// such key.
+    /// Handles a key while the canvas has the focus. `key` is `KeyboardEvent.key`. Returns false if the key has no effect.
     pub fn key(&mut self, key: &str, shift: bool) -> bool {
         pointer::key(&mut self.camera, key, shift)
     }
 
-    /// Fits the canvas to its place on the page.
+    /// Fits the size of the canvas in pixels to its size on the page.
     #[expect(clippy::cast_possible_truncation, reason = "sizes of a screen, at most thousands")]
     #[expect(clippy::cast_sign_loss, reason = "sizes are positive")]
     #[expect(clippy::cast_precision_loss, reason = "sizes of a screen, at most thousands")]
@@ -156,7 +156,7 @@ impl Scene {
         let size =
             [self.canvas.client_width(), self.canvas.client_height()].map(|length| length.max(1) as f32);
         let [width, height] = size.map(|length| (length * self.ratio).round() as u32);
-        // Setting either erases the picture, even to the same value.
+        // Setting the width or height erases the picture, even if the value does not change.
         if self.canvas.width() != width {
             self.canvas.set_width(width);
         }
@@ -167,8 +167,8 @@ impl Scene {
     }
 }
 
-/// The graphics context of a canvas. Its own smooth edges would double the time of software rendering, so pictures are drawn
-/// larger instead, see [`SMOOTH_RATIO`].
+/// The WebGL2 context of a canvas; `None` if the browser has no WebGL2. WebGL's antialiasing would double the time of software
+/// rendering. Instead, pictures are drawn larger on a graphics processor: see [`SMOOTH_RATIO`].
 fn context(canvas: &HtmlCanvasElement) -> Result<Option<Gl>, JsValue> {
     let attributes = WebGlContextAttributes::new();
     attributes.set_alpha(false);
@@ -178,9 +178,9 @@ fn context(canvas: &HtmlCanvasElement) -> Result<Option<Gl>, JsValue> {
     context.map(|context| context.dyn_into::<Gl>().map_err(JsValue::from)).transpose()
 }
 
-/// Device pixels per CSS pixel.
+/// Chooses the number of rendered pixels per CSS pixel: 1 for software rendering.
 fn pixel_ratio(gl: &Gl) -> Result<f32, JsValue> {
-    // A browser that hides the name of the graphics processor has no such extension, or an answer that names none of these.
+    // A browser may hide the name of the graphics processor. Then it counts as a graphics processor.
     gl.get_extension("WEBGL_debug_renderer_info")?;
     let name = gl.get_parameter(UNMASKED_RENDERER)?.as_string().unwrap_or_default().to_ascii_lowercase();
     let is_software =
@@ -188,7 +188,7 @@ fn pixel_ratio(gl: &Gl) -> Result<f32, JsValue> {
     Ok(if is_software { 1.0 } else { SMOOTH_RATIO })
 }
 
-/// Asks the browser to give a lost graphics context back. The result is set when it did.
+/// Asks the browser to restore the graphics context whenever it is lost. The returned flag becomes true when it was restored.
 fn watch_context(canvas: &HtmlCanvasElement) -> Result<Rc<Cell<bool>>, JsValue> {
     let is_restored = Rc::new(Cell::new(false));
     let lost = Closure::<dyn Fn(Event)>::new(|event: Event| event.prevent_default());
@@ -196,7 +196,7 @@ fn watch_context(canvas: &HtmlCanvasElement) -> Result<Rc<Cell<bool>>, JsValue> 
     let flag = Rc::clone(&is_restored);
     let restored = Closure::<dyn Fn()>::new(move || flag.set(true));
     canvas.add_event_listener_with_callback("webglcontextrestored", restored.as_ref().unchecked_ref())?;
-    // The listeners live as long as the canvas, which is as long as the page.
+    // The listeners have to live as long as the canvas, which lives as long as the page.
     lost.forget();
     restored.forget();
     Ok(is_restored)

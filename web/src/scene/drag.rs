@@ -1,4 +1,4 @@
-//! Dragging: a joint by a point of its part, and the tip by inverse kinematics.
+//! Dragging: finds the angle of a joint that follows the pointer, and the pose for a dragged tip by inverse kinematics.
 
 use arm_model::Body;
 use glam::{Vec2, Vec3};
@@ -10,24 +10,25 @@ use sevenbot::cartesian::{Breach, Guard};
 use super::arm::{Angles, Hit, from_vector, point_of, tip_of, to_vector};
 use super::camera::Camera;
 
-/// How far from the last angle a step of a drag looks for a better one, in degrees.
+/// One movement of the pointer searches this far to both sides of the last angle, in degrees.
 const SEARCH: f32 = 24.0;
-/// What a change of one degree costs, in square pixels: an angle that moves nothing on the screen stays.
+/// The cost of a turn, in square pixels per square degree. It keeps the angle if a turn hardly moves the point on the screen.
 const COST_OF_TURNING: f32 = 0.02;
 
-/// A joint that is turned by a point of its part. The angle is the one that brings the point nearest to the pointer.
+/// A drag of a joint by a point of its part. The joint follows the angle that brings the point nearest to the pointer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointDrag {
     joint: u8,
     body: Body,
     local: Vec3,
-    /// From where the point is drawn to the pointer, at the start.
+    /// The vector from the projected point to the pointer at the start, in CSS pixels.
     offset: Vec2,
+    /// The last angle, in degrees.
     angle: f32,
 }
 
 impl JointDrag {
-    /// Takes hold of what the pointer met. `None` for the base.
+    /// Begins a drag at a hit. `None` for the base, or if the point is behind the camera.
     #[must_use]
     pub fn start(hit: Hit, angles: Angles, camera: &Camera, pointer: Vec2) -> Option<Self> {
         let joint = hit.body.joint()?;
@@ -42,8 +43,8 @@ impl JointDrag {
         self.joint
     }
 
-    /// The angle of the joint, in degrees, that follows the pointer, with the other joints at `angles`. It keeps the
-    /// limits of the joint, of the linkage and of the claw.
+    /// Moves the pointer. Returns the new angle of the joint in degrees, with the other joints at `angles`, within the limits of
+    /// the joint, the linkage and the claw.
     pub fn to(&mut self, pointer: Vec2, angles: Angles, camera: &Camera) -> f32 {
         let [low, high] = limits(self.joint, angles);
         let wanted = pointer - self.offset;
@@ -66,7 +67,7 @@ impl JointDrag {
     }
 }
 
-/// Angles from `middle` on to both sides, the nearest first.
+/// Angles on both sides of `middle` up to `reach`, the nearest first.
 fn steps(middle: f32, reach: f32, step: f32) -> impl Iterator<Item = f32> {
     let outward = std::iter::successors(Some(0.0), move |offset| Some(offset + step));
     outward
@@ -74,7 +75,7 @@ fn steps(middle: f32, reach: f32, step: f32) -> impl Iterator<Item = f32> {
         .flat_map(move |offset| [middle + offset, middle - offset])
 }
 
-/// The lowest and the highest angle of a joint with the others at these angles, in degrees.
+/// The lowest and the highest angle of a joint while the other joints are at these angles, in degrees.
 #[expect(clippy::cast_possible_truncation, reason = "limits in whole degrees")]
 #[must_use]
 pub fn limits(joint: u8, angles: Angles) -> [f32; 2] {
@@ -93,7 +94,7 @@ pub fn limits(joint: u8, angles: Angles) -> [f32; 2] {
     }
 }
 
-/// These angles, with another angle in degrees for one joint, 1 to 7.
+/// Replaces the angle of one joint, 1 to 7, in degrees.
 #[must_use]
 pub fn with_joint(mut angles: Angles, joint: u8, degrees: f32) -> Angles {
     if let Some(angle) = usize::from(joint).checked_sub(1).and_then(|place| angles.get_mut(place)) {
@@ -102,35 +103,36 @@ pub fn with_joint(mut angles: Angles, joint: u8, degrees: f32) -> Angles {
     angles
 }
 
-/// Where the tip is wanted, and what the arm can do about it.
+/// A wanted position of the tip, and the pose for it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TipWish {
     /// The wanted position of the tip, in mm.
     pub tip: Vec3,
-    /// The angles that bring it there, or why there are none.
+    /// The angles that reach the position, or the reason why the arm cannot go there.
     pub reach: Result<Angles, Unreachable>,
 }
 
-/// Why the tip cannot follow the pointer.
+/// The reason why the tip cannot be at a position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Refusal {
     /// No angles reach the position.
     OutOfReach(NoSolution),
-    /// The guard of the workspace does not allow it.
+    /// The guard of the workspace does not allow the pose.
     Guarded(Breach),
 }
 
-/// A position out of reach, or not allowed.
+/// The failure for a position that is out of reach or not allowed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Unreachable {
-    /// Why.
+    /// The reason.
     pub why: Refusal,
-    /// Angles with the tip as near to it as the arm comes with the same direction of the tool.
+    /// For a position out of reach, the angles of the nearest pose with the same direction of the tool. `None` if there is none,
+    /// or if the guard does not allow the pose.
     pub nearest: Option<Angles>,
 }
 
-/// Solves for a position of the tip in mm, with the direction of the tool that `angles` has. Joints 6 and 7 stay. The
-/// position is above the table, and outside the base.
+/// Solves the inverse kinematics for a position of the tip in mm, with the same direction of the tool as at `angles`. Joints 6
+/// and 7 keep their angles. The guard of the workspace has to allow the pose: no part of it below the table or in the base.
 #[must_use]
 pub fn wish(tip: Vec3, angles: Angles) -> TipWish {
     let [t1, t2, t3, t4, t5, t6, _] = angles.map(f64::from);
@@ -146,14 +148,14 @@ pub fn wish(tip: Vec3, angles: Angles) -> TipWish {
     TipWish { tip, reach: reach.and_then(|reached| allowed(reached).map(|()| reached)) }
 }
 
-/// Does the guard of the workspace allow these angles?
+/// Checks these angles with the guard of the workspace.
 fn allowed(angles: Angles) -> Result<(), Unreachable> {
     let [t1, t2, t3, t4, t5, ..] = angles.map(f64::from);
     let refused = |breach| Unreachable { why: Refusal::Guarded(breach), nearest: None };
     Guard::default().check_pose([t1, t2, t3, t4, t5]).map_err(refused)
 }
 
-/// Of all solutions for a position, the one with the smallest turn of any joint.
+/// The solution for a position whose largest turn of a joint, from `angles`, is the smallest.
 fn nearest_solution(tip: Vec3, angles: Angles) -> Option<Angles> {
     let [t1, t2, t3, t4, t5, t6, _] = angles.map(f64::from);
     let tool = forward([t1, t2, t3, t4, t5, t6]).hand.tool;
@@ -166,7 +168,7 @@ fn largest_turn(one: Angles, other: Angles) -> f32 {
     one.iter().zip(other).map(|(one, other)| (one - other).abs()).fold(0.0, f32::max)
 }
 
-/// Angles of joints 1 to 5, with those of 6 and 7 from `angles`.
+/// Adds joints 6 and 7 from `angles` to a solution for joints 1 to 5.
 #[expect(clippy::cast_possible_truncation, reason = "rounds to the nearest f32")]
 fn extended(solution: [f64; 5], angles: Angles) -> Angles {
     let [t1, t2, t3, t4, t5] = solution.map(|angle| angle as f32);
@@ -174,23 +176,23 @@ fn extended(solution: [f64; 5], angles: Angles) -> Angles {
     [t1, t2, t3, t4, t5, t6, t7]
 }
 
-/// The tip that is moved in the plane through it that faces the camera.
+/// A drag of the tip, in the plane through its start that is parallel to the screen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TipDrag {
-    /// From where the tip is drawn to the pointer, at the start.
+    /// The vector from the projected tip to the pointer at the start, in CSS pixels.
     offset: Vec2,
-    /// The angles at the start: the tool keeps their direction.
+    /// The angles at the start. The tool keeps the direction that it has at these.
     start: Angles,
 }
 
 impl TipDrag {
-    /// Takes hold of the tip. `None` if it is behind the camera.
+    /// Begins a drag of the tip. `None` if the tip is behind the camera.
     #[must_use]
     pub fn start(angles: Angles, camera: &Camera, pointer: Vec2) -> Option<Self> {
         Some(Self { offset: pointer - camera.project(tip_of(angles))?, start: angles })
     }
 
-    /// Where the pointer wants the tip.
+    /// Moves the pointer. Returns the wanted position of the tip and the pose for it.
     #[must_use]
     pub fn to(&self, pointer: Vec2, camera: &Camera) -> TipWish {
         wish(camera.on_facing_plane(pointer - self.offset, tip_of(self.start)), self.start)
@@ -231,7 +233,7 @@ mod tests {
                 };
                 let hit = Hit { body, local, distance: 0.0 };
                 let mut drag = JointDrag::start(hit, POSE, &camera, drawn(POSE[place])).expect("a joint");
-                // Twelve degrees in steps of one: the drag ends where the point was led to on the screen.
+                // The pointer follows the point through 12 degrees in steps of 1. The dragged point has to end at the pointer.
                 let led = POSE[place] + 12.0;
                 for step in 1..=12 {
                     drag.to(drawn(POSE[place] + step as f32), POSE, &camera);

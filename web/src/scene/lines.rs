@@ -1,4 +1,5 @@
-//! Lines of the scene: the grid on the table with its labels in mm, the line below the tip, and a position out of reach.
+//! The lines of the scene: the grid on the table with its labels in mm, the plumb line below the tip, and the dashed line
+//! to a position out of reach.
 
 use glam::{Vec2, Vec3};
 use kinematics::geometry::BASE_HEIGHT;
@@ -8,28 +9,28 @@ use super::camera::Camera;
 use super::theme::{Palette, Rgb};
 use super::view::View;
 
-/// Between lines of the grid, in mm.
+/// The distance between lines of the grid, in mm.
 const STEP: f32 = 50.0;
-/// Steps from the middle to the edge of the grid.
+/// The number of steps from the middle of the grid to its edge.
 const STEPS: i16 = 9;
-/// Height of a label, in mm.
+/// The height of a character of a label, in mm.
 const LABEL: f32 = 13.0;
-/// Length of a dash, in mm.
+/// The length of a dash and of a gap, in mm.
 const DASH: f32 = 6.0;
 
 /// The height of the table in the frame of the arm, in mm.
 #[expect(clippy::cast_possible_truncation, reason = "a whole number of millimetres")]
 pub const TABLE: f32 = -BASE_HEIGHT as f32;
 
-/// An end of a line: position in mm, red, green, blue and opacity.
+/// An end of a line: x, y, z in mm, then red, green, blue and opacity from 0 to 1.
 pub type LineEnd = [f32; 7];
 
-/// The lines of a view, two ends each: the grid, and what is drawn over the arm.
+/// The lines of a view, two ends for each line.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Lines {
-    /// On the table, behind the arm.
+    /// Drawn before the arm, so that the arm hides them.
     pub ground: Vec<LineEnd>,
-    /// Hidden by nothing.
+    /// Drawn after the arm, without a depth test.
     pub over: Vec<LineEnd>,
 }
 
@@ -57,7 +58,7 @@ fn line(lines: &mut Vec<LineEnd>, ends: [Vec3; 2], colour: Rgb, opacities: [f32;
     lines.extend(ends.map(|(Vec3 { x, y, z }, opacity)| [x, y, z, red, green, blue, opacity]));
 }
 
-/// A square grid that fades towards a circle. Every second line, a multiple of 100 mm, is stronger.
+/// A square grid that fades towards a circular edge. Lines at multiples of 100 mm are stronger.
 fn grid(lines: &mut Vec<LineEnd>, palette: &Palette) {
     let radius = f32::from(STEPS) * STEP + STEP / 2.0;
     for step in -STEPS..=STEPS {
@@ -96,7 +97,7 @@ fn labels(lines: &mut Vec<LineEnd>, palette: &Palette, camera: &Camera) {
 
 fn write(lines: &mut Vec<LineEnd>, palette: &Palette, camera: &Camera, at: Vec3, text: &str) {
     let (right, up) = camera.screen_axes();
-    // A character is 2 wide and 4 high, with 1 between two of them.
+    // In units of a quarter of the height, a character is 2 wide and 4 high, with a gap of 1 to the next one.
     let unit = LABEL / 4.0;
     for (place, character) in (0_u16..).zip(text.chars()) {
         let left = f32::from(place) * 3.0 + 1.5;
@@ -139,7 +140,7 @@ const fn strokes(character: char) -> &'static [Stroke] {
     }
 }
 
-/// From the tip down to the table, with a ring where it ends.
+/// A line from the tip down to the table, with a ring at its foot.
 fn plumb_line(lines: &mut Vec<LineEnd>, tip: Vec3, colour: Rgb) {
     let foot = tip.with_z(TABLE);
     line(lines, [tip, foot], colour, [0.55, 0.55]);

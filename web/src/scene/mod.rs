@@ -1,4 +1,4 @@
-//! The arm in 3D: a WebGL2 picture of a [`View`], and what a pointer on it means.
+//! The arm in 3D: draws a [`View`] with WebGL2, and interprets pointers on the picture.
 //!
 //! ```text
 //!   kinematics ──▶ arm-model ──▶ arm: triangles, pick ──▶ drag ──▶ pointer ──▶ SceneEvent
@@ -7,7 +7,7 @@
 //! ```
 //!
 //! Positions are millimetres in the frame of the arm: x to the right, y forward, z up. Pixels are CSS pixels from the top
-//! left of the canvas. All but the renderer and the canvas runs on the host too.
+//! left of the canvas. Everything except the renderer and the canvas also runs on the host.
 
 pub mod arm;
 pub mod camera;

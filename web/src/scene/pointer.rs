@@ -1,4 +1,4 @@
-//! From mouse and touch to what they mean: the camera turns, a joint or the tip is dragged, a part is hovered.
+//! Interprets mouse and touch: turns the camera, drags a joint or the tip, or reports the part under the pointer.
 //!
 //! ```text
 //!   one pointer on a part      drags its joint        two pointers (touch)   zoom and pan
@@ -12,26 +12,26 @@ use super::arm::{Angles, Arm, Part, tip_of};
 use super::camera::Camera;
 use super::drag::{JointDrag, TipDrag, TipWish};
 
-/// How near to the marker of the tip a pointer takes hold of it, in CSS pixels.
+/// A pointer within this distance of the projected tip grabs it, in CSS pixels.
 const TIP_RADIUS: f32 = 16.0;
-/// How much a wheel of one CSS pixel zooms.
+/// The logarithm of the zoom factor for one CSS pixel of the wheel.
 const ZOOM_PER_PIXEL: f32 = 0.0012;
 
-/// What a person asked for with a pointer.
+/// The result of a pointer event.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SceneEvent {
-    /// The pointer is over another part now, or over none.
+    /// The pointer is over another part now; `None` if it is over no part.
     Hovered(Option<Part>),
     /// A joint is dragged.
     JointDragged {
         /// Its number, 1 to 7.
         joint: u8,
-        /// The angle that follows the pointer, in degrees, within the limits.
+        /// The new angle in degrees, within the limits.
         degrees: f32,
     },
     /// The tip is dragged.
     TipDragged(TipWish),
-    /// A dragged joint or tip was let go.
+    /// A drag of a joint or the tip has ended.
     Released,
 }
 
@@ -40,11 +40,11 @@ pub enum SceneEvent {
 pub enum Button {
     /// The left one, a finger or a pen.
     Primary,
-    /// Any other one.
+    /// Any other button.
     Secondary,
 }
 
-/// What a pointer that is down does.
+/// The effect of a pointer that is down.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Grab {
     Orbit,
@@ -53,7 +53,7 @@ enum Grab {
     Tip(TipDrag),
 }
 
-/// The pointers that are down, in CSS pixels from the top left of the picture.
+/// The state of all pointers. Positions are CSS pixels from the top left of the picture.
 #[derive(Clone, Debug, Default)]
 pub struct Pointer {
     down: Vec<(i32, Vec2)>,
@@ -62,7 +62,7 @@ pub struct Pointer {
 }
 
 impl Pointer {
-    /// What is under a pixel: the tip within 16 CSS pixels, or a part of an arm with these angles.
+    /// The part of an arm with these angles under a pixel. The tip takes precedence within 16 CSS pixels.
     #[must_use]
     pub fn part_at(arm: &Arm, camera: &Camera, angles: Angles, at: Vec2) -> Option<Part> {
         let is_tip = camera.project(tip_of(angles)).is_some_and(|tip| tip.distance(at) <= TIP_RADIUS);
@@ -78,7 +78,7 @@ impl Pointer {
         matches!(self.grab, Some(Grab::Joint(_) | Grab::Tip(_)))
     }
 
-    /// A pointer with this identifier went down.
+    /// Handles a pointer that went down: its identifier, position and button.
     pub fn down(
         &mut self,
         (id, at, button): (i32, Vec2, Button),
@@ -99,7 +99,7 @@ impl Pointer {
         (was_dragging && !self.is_dragging()).then_some(SceneEvent::Released)
     }
 
-    /// A pointer moved.
+    /// Handles a pointer that moved: its identifier and position.
     pub fn moved(
         &mut self,
         (id, at): (i32, Vec2),
@@ -129,16 +129,16 @@ impl Pointer {
         None
     }
 
-    /// A pointer went up, left or was cancelled.
+    /// Handles a pointer that went up or was cancelled.
     pub fn up(&mut self, id: i32) -> Option<SceneEvent> {
         self.down.retain(|(other, _)| *other != id);
         let was_dragging = self.is_dragging();
-        // The finger that remains after a pinch turns the camera.
+        // After a pinch, the remaining finger turns the camera.
         self.grab = (!self.down.is_empty()).then_some(Grab::Orbit);
         was_dragging.then_some(SceneEvent::Released)
     }
 
-    /// No pointer is over the picture any more.
+    /// Handles a pointer that left the picture without being down.
     pub fn left(&mut self) -> Option<SceneEvent> {
         self.hover(None)
     }
@@ -149,12 +149,12 @@ impl Pointer {
     }
 }
 
-/// Zooms by a wheel that turned by this many CSS pixels; positive moves away.
+/// Zooms by a turn of the wheel, in CSS pixels; a positive number moves the camera away.
 pub fn wheel(camera: &mut Camera, pixels: f32) {
     camera.zoom((pixels.clamp(-400.0, 400.0) * ZOOM_PER_PIXEL).exp());
 }
 
-/// Does what a key of the keyboard asks the camera for, named as in `KeyboardEvent.key`. False if it asks for nothing.
+/// Moves the camera by a key, named as in `KeyboardEvent.key`. Returns false if the key has no effect.
 pub fn key(camera: &mut Camera, key: &str, shift: bool) -> bool {
     let step = 12.0;
     match (key, shift) {
@@ -187,7 +187,7 @@ fn grab(arm: &Arm, camera: &Camera, angles: Angles, at: Vec2) -> Grab {
     grabbed.unwrap_or(Grab::Orbit)
 }
 
-/// Two fingers, one of which moved: what was between them stays between them.
+/// Handles the movement of one of two fingers: zooms and pans so that the scene follows both fingers.
 fn pinch(camera: &mut Camera, other: Vec2, before: Vec2, at: Vec2) {
     let (old, new) = (other.distance(before).max(10.0), other.distance(at).max(10.0));
     camera.zoom(old / new);

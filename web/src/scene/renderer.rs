@@ -19,19 +19,19 @@ use super::theme::{Palette, Rgb};
 use super::things::triangles;
 use super::view::View;
 
-/// Numbers of one corner of the arm: position, normal, body and finish.
+/// The number of floats of a corner of the arm: position, normal, index of the body, and finish.
 const CORNER: usize = 8;
 /// The direction to the lamp that casts the shadow.
 const LAMP: Vec3 = Vec3::new(0.25, -0.2, 1.0);
-/// Diameters of the markers, in CSS pixels.
+/// The diameters of the markers of the tip and of a position out of reach, in CSS pixels. A hovered tip has the larger one.
 const TIP_SIZE: f32 = 13.0;
 const WISH_SIZE: f32 = 18.0;
-/// Radius of the table, in mm, and the corners of its edge.
+/// The radius of the table in mm, and the number of corners of its edge.
 const TABLE_RADIUS: f32 = 520.0;
 const TABLE_SIDES: u8 = 48;
-/// How much of the highlight's colour a hovered part gets.
+/// The weight of the highlight's colour in a hovered part, from 0 to 1.
 const HIGHLIGHT: f32 = 0.4;
-/// How much of its joint's colour a shell gets: where the joint works, and in any other state.
+/// The weight of a joint's colour in the shell of its part, from 0 to 1: for a joint that works, and for any other state.
 const SHELL_WEIGHT: f32 = 0.12;
 const SHELL_WEIGHT_ELSE: f32 = 0.4;
 
@@ -44,14 +44,14 @@ pub struct Renderer {
     markers: Layer,
 }
 
-/// A program, and a buffer in the layout that it reads.
+/// A shader program, a buffer, and the layout of the buffer for the program.
 struct Layer {
     program: WebGlProgram,
     buffer: WebGlBuffer,
     layout: WebGlVertexArrayObject,
 }
 
-/// How the bodies of the arm are drawn.
+/// The style in which the bodies of the arm are drawn.
 struct Look {
     tint: Vec4,
     shading: f32,
@@ -62,7 +62,7 @@ impl Renderer {
     /// Compiles the programs and uploads the meshes.
     ///
     /// # Errors
-    /// The message of the graphics driver.
+    /// The graphics driver reports an error, whose message is returned.
     pub fn new(gl: Gl, arm: &Arm) -> Result<Self, JsValue> {
         let layer =
             |vertex, fragment, attributes: &[(&str, i32)]| Layer::new(&gl, vertex, fragment, attributes);
@@ -76,7 +76,7 @@ impl Renderer {
         let markers = layer(shaders::MARKER_VERTEX, shaders::MARKER_FRAGMENT, &ends)?;
         let (corners, indices) = corners(arm);
         of_arm.upload(&gl, corners.as_flattened(), Gl::STATIC_DRAW);
-        // The layout of the arm keeps the binding.
+        // The selected vertex array of the arm stores this binding.
         gl.bind_buffer(Gl::ELEMENT_ARRAY_BUFFER, gl.create_buffer().as_ref());
         let array = js_sys::Uint16Array::from(indices.as_slice());
         gl.buffer_data_with_array_buffer_view(Gl::ELEMENT_ARRAY_BUFFER, &array, Gl::STATIC_DRAW);
@@ -85,7 +85,7 @@ impl Renderer {
         Ok(Self { arm: of_arm, indices: count(indices.len()), lines, markers, gl })
     }
 
-    /// Draws a view. Width and height are device pixels; `ratio` is device pixels per CSS pixel.
+    /// Draws a view. Width and height are in rendered pixels; `ratio` is rendered pixels per CSS pixel.
     pub fn draw(&self, view: &View, camera: &Camera, [width, height]: [i32; 2], ratio: f32) {
         let (gl, palette) = (&self.gl, view.theme.palette());
         gl.viewport(0, 0, width, height);
@@ -118,7 +118,7 @@ impl Renderer {
         self.gl.disable(Gl::BLEND);
     }
 
-    /// Selects the arm's program, with the colours of a view.
+    /// Selects the arm's program, and sets the colours of a view.
     fn use_arm(&self, view: &View, palette: &Palette) {
         let (gl, arm) = (&self.gl, &self.arm);
         arm.select(gl);
@@ -148,7 +148,7 @@ impl Renderer {
         gl.draw_elements_with_i32(Gl::TRIANGLES, self.indices, Gl::UNSIGNED_SHORT, 0);
     }
 
-    /// The arm, flattened onto the table along the light. The stencil keeps a pixel from being darkened twice.
+    /// Draws the arm flattened onto the table along the direction of the lamp. The stencil darkens a pixel only once.
     fn draw_shadow(&self, view: &View, palette: &Palette, projection: Mat4) {
         let gl = &self.gl;
         let slope = -LAMP.truncate() / LAMP.z;
@@ -168,7 +168,8 @@ impl Renderer {
         gl.disable(Gl::STENCIL_TEST);
     }
 
-    /// First only the depth, then only what is in front. Where ghost and arm coincide, the offset lets the arm be seen.
+    /// Draws the ghost in two passes: first only its depth, then only its nearest surfaces, so that it is one translucent layer.
+    /// The polygon offset moves it back, so that the arm stays visible where both coincide.
     fn draw_ghost(&self, angles: Angles, palette: &Palette, projection: Mat4) {
         let gl = &self.gl;
         let [red, green, blue] = palette.ghost.floats();
@@ -269,7 +270,7 @@ impl Layer {
     }
 }
 
-/// The colour of a part's joint, and its weight in the part's shell: a joint that does not work is seen from afar.
+/// The colour of a part's joint, and its weight in the part's shell. The weight is larger for a joint that does not work.
 fn accent(view: &View, palette: &Palette, part: Part) -> [f32; 4] {
     let colour = match part {
         Part::Joint(joint) => view.colours.get(usize::from(joint).wrapping_sub(1)).copied(),
@@ -280,8 +281,8 @@ fn accent(view: &View, palette: &Palette, part: Part) -> [f32; 4] {
     [red, green, blue, weight]
 }
 
-/// All different corners of the arm, in the layout of the arm's program, and their indices in the order of the triangles:
-/// a corner that triangles share is computed once.
+/// The distinct corners of the arm in the layout of the arm's program, and their indices in the order of the triangles. So a
+/// corner that several triangles share is processed only once.
 fn corners(arm: &Arm) -> (Vec<[f32; CORNER]>, Vec<u16>) {
     let (mut corners, mut indices, mut known) = (Vec::new(), Vec::new(), HashMap::new());
     for (number, (_, mesh)) in (0_u8..).zip(arm.meshes()) {
@@ -320,7 +321,7 @@ fn table(palette: &Palette) -> Vec<LineEnd> {
     sides.collect()
 }
 
-/// A number of corners as WebGL takes it.
+/// Converts a number of corners to the type that WebGL needs.
 fn count(corners: usize) -> i32 {
     i32::try_from(corners).unwrap_or(i32::MAX)
 }

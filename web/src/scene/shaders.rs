@@ -1,6 +1,6 @@
-//! The programs of the graphics processor, in GLSL ES 3.00.
+//! The shaders, in GLSL ES 3.00.
 
-/// Corners of the arm's triangles. Light is computed for each corner: software rendering has few corners and many pixels.
+/// The vertex shader of the arm. It computes the light: in software rendering, corners are fewer and cheaper than pixels.
 pub const ARM_VERTEX: &str = r"#version 300 es
 uniform mat4 view_projection;
 uniform mat4 bodies[11];
@@ -34,7 +34,7 @@ void main() {
 }
 ";
 
-/// The arm's pixels.
+/// The fragment shader of the arm, with premultiplied opacity.
 pub const ARM_FRAGMENT: &str = r"#version 300 es
 precision mediump float;
 uniform float opacity;
@@ -45,7 +45,7 @@ void main() {
 }
 ";
 
-/// Ends of lines, and corners of plain triangles.
+/// The vertex shader of lines and of triangles without lighting.
 pub const LINE_VERTEX: &str = r"#version 300 es
 uniform mat4 view_projection;
 in vec3 position;
@@ -57,7 +57,7 @@ void main() {
 }
 ";
 
-/// The pixels of lines.
+/// The fragment shader of lines and of triangles without lighting.
 pub const LINE_FRAGMENT: &str = r"#version 300 es
 precision mediump float;
 in vec4 blended;
@@ -67,7 +67,7 @@ void main() {
 }
 ";
 
-/// A marker: a square of device pixels round a position.
+/// The vertex shader of a marker: a square of rendered pixels around a position.
 pub const MARKER_VERTEX: &str = r"#version 300 es
 uniform mat4 view_projection;
 uniform float size;
@@ -81,7 +81,7 @@ void main() {
 }
 ";
 
-/// A marker is a disc with a rim, or a ring if `hollow` is above 0.
+/// The fragment shader of a marker: a disc with a rim, or a ring if `hollow` is above 0.
 pub const MARKER_FRAGMENT: &str = r"#version 300 es
 precision mediump float;
 uniform float hollow;

@@ -1,6 +1,6 @@
-//! Colours of the scene and of the plots, on light and on dark backgrounds.
+//! The colours of the scene and of the plots, for light and dark backgrounds.
 
-/// A colour of the screen (sRGB), 0 to 255 each.
+/// A colour in sRGB: red, green and blue from 0 to 255.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rgb(pub u8, pub u8, pub u8);
 
@@ -20,7 +20,7 @@ impl Rgb {
     }
 }
 
-/// Light or dark.
+/// The theme: light or dark.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Theme {
     /// A light background.
@@ -39,7 +39,7 @@ pub struct Palette {
     pub table: Rgb,
     /// Lines of the grid.
     pub grid: Rgb,
-    /// Axes, and text.
+    /// Axes and text.
     pub text: Rgb,
     /// Shells of the arm.
     pub shell: Rgb,
@@ -53,7 +53,7 @@ pub struct Palette {
     pub tip: Rgb,
     /// A position out of reach.
     pub unreachable: Rgb,
-    /// What the part under the pointer is mixed with.
+    /// Mixed into the colour of the part under the pointer.
     pub hover: Rgb,
     /// A joint that works.
     pub joint_ok: Rgb,
@@ -122,7 +122,7 @@ const DARK: Palette = Palette {
 };
 
 impl Theme {
-    /// The colours.
+    /// The colours of the theme.
     #[must_use]
     pub const fn palette(self) -> &'static Palette {
         match self {

@@ -1,4 +1,4 @@
-//! Things on the table: boxes and cylinders, as triangles with the colour of each face.
+//! Things and walls on the table: converts them to triangles with the colour of each face.
 
 use arm_sim::scene::{Block, Form};
 use arm_sim::world::{Object, World};
@@ -9,9 +9,9 @@ use super::lines::LineEnd;
 use super::theme::{Palette, Rgb};
 use super::view::Thing;
 
-/// Corners of the edge of a cylinder.
+/// The number of corners of the outline of a cylinder.
 const SIDES: u16 = 24;
-/// Names that begin with these are drawn in these colours.
+/// A thing whose name begins with one of these words has this colour.
 const NAMED: [(&str, Rgb); 6] = [
     ("red", Rgb(214, 60, 52)),
     ("green", Rgb(56, 158, 84)),
@@ -20,10 +20,10 @@ const NAMED: [(&str, Rgb); 6] = [
     ("orange", Rgb(232, 128, 40)),
     ("white", Rgb(236, 238, 240)),
 ];
-/// The direction to the light.
+/// The direction to the light that shades the faces.
 const LIGHT: Vec3 = Vec3::new(0.25, -0.45, 0.85);
 
-/// The walls and things of a room.
+/// Converts the walls and things of a room for the view.
 #[must_use]
 pub fn things(world: &World) -> Vec<Thing> {
     let table = world.scene().table;
@@ -71,7 +71,7 @@ const fn single(value: f64) -> f32 {
     value as f32
 }
 
-/// The triangles of the things, three corners each, counter-clockwise seen from outside.
+/// The triangles of the things: three corners each, counter-clockwise when seen from outside.
 #[must_use]
 pub fn triangles(things: &[Thing], palette: &Palette) -> Vec<LineEnd> {
     let mut corners = Vec::new();
@@ -92,7 +92,7 @@ fn circle() -> Vec<Vec2> {
     (0..SIDES).map(|side| Vec2::from_angle(angle(side))).collect()
 }
 
-/// Adds a prism over this outline, which goes round counter-clockwise.
+/// Adds a prism with this outline, whose corners are in counter-clockwise order.
 fn add(corners: &mut Vec<LineEnd>, thing: &Thing, outline: &[Vec2], colour: Rgb) {
     let [x, y, z] = thing.axes;
     let at = |edge: Vec2, height: f32| thing.middle + x * edge.x + y * edge.y + z * height;

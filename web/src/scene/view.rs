@@ -1,32 +1,31 @@
-//! What the scene shows.
+//! The content of a picture of the scene.
 
 use glam::Vec3;
 
 use super::arm::{Angles, Part};
 use super::theme::{Rgb, Theme};
 
-/// A thing, as it is drawn.
+/// A box or cylinder in the scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Thing {
     /// Its middle, in mm.
     pub middle: Vec3,
-    /// Its axes, each as long as half of its size.
+    /// Its axes. The length of each one is half of the size along it, in mm.
     pub axes: [Vec3; 3],
-    /// It is a cylinder along its third axis.
+    /// True for a cylinder along the third axis, false for a box.
     pub is_round: bool,
-    /// The colour that its name says.
+    /// The colour with which its name begins; `None` if it begins with no colour.
     pub named: Option<Rgb>,
-    /// It never moves.
+    /// True for a wall, which never moves.
     pub is_wall: bool,
 }
 
-/// What the scene shows. Two equal views have the same picture.
+/// The content of a picture. Two equal views give the same picture from the same camera.
 #[derive(Clone, Debug, PartialEq)]
 pub struct View {
     /// Measured angles of joints 1 to 7, in degrees.
     pub measured: Angles,
-    /// Angles of the ghost: targets, a moment of a time line, or the nearest pose to a position out of reach. It is drawn where any joint differs
-    /// from the measured angle by more than a degree.
+    /// Angles of the ghost in degrees: the targets, or a moment of a time line. See [`Self::ghost`].
     pub targets: Option<Angles>,
     /// The colours of joints 1 to 7: see [`Palette::joint_ok`](super::theme::Palette::joint_ok) and its neighbours.
     pub colours: [Rgb; 7],
@@ -34,9 +33,9 @@ pub struct View {
     pub unreachable: Option<Vec3>,
     /// What stands on the table, and what the arm carries.
     pub things: Vec<Thing>,
-    /// The part under the pointer or with the keyboard's focus.
+    /// The part under the pointer.
     pub hovered: Option<Part>,
-    /// Light or dark.
+    /// The colours.
     pub theme: Theme,
 }
 
@@ -55,7 +54,7 @@ impl Default for View {
 }
 
 impl View {
-    /// The angles of the ghost, where it can be told from the arm.
+    /// The angles of the ghost. `None` if no joint differs from its measured angle by more than 1 degree: it is not drawn.
     #[must_use]
     pub fn ghost(&self) -> Option<Angles> {
         let differs = |ghost: &Angles| {

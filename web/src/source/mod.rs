@@ -1,6 +1,6 @@
-//! Where an arm is: in this tab, behind a server, or on this computer's USB.
+//! The connections to an arm: simulated in this tab, behind a server, or on this computer's USB.
 //!
-//! A source carries bytes. It does not know frames.
+//! A source carries bytes, without knowledge of frames.
 
 #[cfg(target_arch = "wasm32")]
 pub mod serial;
@@ -8,14 +8,14 @@ pub mod simulator;
 #[cfg(target_arch = "wasm32")]
 pub mod socket;
 
-/// What a source can say of its line.
+/// The state of the line of a source.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum LineState {
-    /// It is being opened.
+    /// The line is being opened.
     Opening,
-    /// Bytes pass.
+    /// The line is open.
     Open,
-    /// It failed, or was closed, with the reason in the browser's words.
+    /// Opening failed, or the line was closed. Holds the reason in the browser's words; empty if the browser gives none.
     Closed(String),
 }
 
@@ -24,7 +24,7 @@ pub trait Source {
     /// Sends bytes. They are lost while the line is not open.
     fn send(&mut self, bytes: &[u8]);
 
-    /// The bytes that have arrived since the last call.
+    /// Takes the bytes that have arrived since the last call. Never blocks.
     fn receive(&mut self) -> Vec<u8>;
 
     /// The state of the line.

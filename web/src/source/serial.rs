@@ -1,4 +1,4 @@
-//! An arm on this computer's USB, by Web Serial. Only some browsers have it.
+//! An arm on this computer's USB, through Web Serial, which only some browsers have.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -24,7 +24,8 @@ struct Port {
 }
 
 impl SerialSource {
-    /// Asks the person for a port, and opens it. Call this from a click. `None` if the browser has no Web Serial.
+    /// Lets the user choose a port, and opens it. Call it only while the browser handles a click: it allows the choice only then.
+    /// `None` if the browser has no Web Serial.
     #[must_use]
     pub fn ask() -> Option<Self> {
         let navigator = web_sys::window()?.navigator();
@@ -42,7 +43,7 @@ impl SerialSource {
     }
 }
 
-/// Opens a port, and keeps what it receives until it ends.
+/// Opens a port, and stores the received bytes until the port closes.
 async fn run(serial: &JsValue, shared: &Rc<RefCell<Port>>) -> Result<(), JsValue> {
     let port = call(serial, "requestPort", &[])?.await?;
     let options = Object::new();
@@ -91,7 +92,7 @@ impl Drop for SerialSource {
         let port = self.0.borrow();
         let (reader, writer, port) = (port.reader.clone(), port.writer.clone(), port.port.clone());
         spawn_local(async move {
-            // Each may have ended already.
+            // Ignore errors: each of these may have ended already.
             if let Some(Ok(done)) = reader.map(|reader| call(&reader, "cancel", &[])) {
                 let _ = done.await;
             }
@@ -109,7 +110,7 @@ impl Source for SerialSource {
     fn send(&mut self, bytes: &[u8]) {
         let port = self.0.borrow();
         if let (Some(writer), false) = (&port.writer, bytes.is_empty()) {
-            // The writer queues the bytes in their order. A failure ends the reader, which is seen there.
+            // The writer queues the bytes in order. Ignore a failure here: it also ends the reader, which sets the state.
             if let Ok(sent) = call(writer, "write", &[Uint8Array::from(bytes).into()]) {
                 spawn_local(async move {
                     let _ = sent.await;

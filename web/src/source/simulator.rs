@@ -1,18 +1,18 @@
-//! The whole arm in this tab: controller, servos and gravity, in virtual time.
+//! A simulated arm in this tab, with controller, servos and gravity, in virtual time.
 
 use arm_sim::scene::Scene;
 use arm_sim::{Action, Duration, Instant, Simulation, SimulationConfig};
 
 use super::{LineState, Source};
 
-/// A slice of virtual time. The line is polled after each.
+/// The simulation advances in slices of this virtual time.
 const SLICE: Duration = Duration::from_millis(10);
 
-/// A simulated arm. A copy goes its own way.
+/// A simulated arm. A clone is independent of the original.
 #[derive(Clone)]
 pub struct SimulatedSource {
     simulation: Simulation,
-    /// Virtual time that has passed in the browser, but not in the simulation yet, in microseconds.
+    /// The virtual time by which the simulation lags behind, in microseconds.
     owed: f64,
 }
 
@@ -27,19 +27,20 @@ impl Default for SimulatedSource {
 }
 
 impl SimulatedSource {
-    /// The virtual time.
+    /// The present virtual time.
     #[must_use]
     pub const fn now(&self) -> Instant {
         self.simulation.now()
     }
 
-    /// The simulation, to look at.
+    /// The simulation, for reading its state.
     #[must_use]
     pub const fn simulation(&self) -> &Simulation {
         &self.simulation
     }
 
-    /// Lets virtual time pass, until `has_time` says that the page needs the processor. Time that did not fit is dropped.
+    /// Advances the simulation by this virtual time, in microseconds, or until `has_time` returns false. Keeps at
+    /// most one slice of the remaining time, and drops the rest.
     pub fn advance(&mut self, virtual_micros: f64, mut has_time: impl FnMut() -> bool) {
         self.owed += virtual_micros;
         let slice = SLICE.as_micros();
@@ -51,7 +52,7 @@ impl SimulatedSource {
         self.owed = self.owed.min(micros);
     }
 
-    /// Does something to the arm: a fault, a hand, power.
+    /// Carries out an action on the arm, such as a fault, a move by hand or a power cycle.
     pub fn act(&mut self, action: Action) {
         self.simulation.act(action);
     }
@@ -82,7 +83,7 @@ mod tests {
     use sevenbot::map::{SET_POINT_PERIOD, SPEED, WATCHDOG_ACTION};
     use sevenbot::{Joint, Problem, ProblemKind};
 
-    /// A client and an arm that was switched on a second ago.
+    /// A client and an arm that was switched on 100 pictures, 1.7 s, ago.
     fn connected() -> (Client, SimulatedSource) {
         let (mut client, mut arm) = (Client::default(), SimulatedSource::default());
         pass(&mut client, &mut arm, 100);
@@ -94,7 +95,7 @@ mod tests {
         (0..frames).for_each(|_| exchange(client, arm, 16_667.0));
     }
 
-    /// As [`pass`], but nothing that the arm sends gets through.
+    /// As [`pass`], but discards all bytes that the arm sends.
     fn pass_without_replies(client: &mut Client, arm: &mut SimulatedSource, frames: u32) {
         for _ in 0..frames {
             arm.send(&client.poll(arm.now()));
@@ -104,7 +105,7 @@ mod tests {
         }
     }
 
-    /// Where joint 1 is, in degrees.
+    /// The true angle of joint 1, in degrees.
     fn base(arm: &SimulatedSource) -> f64 {
         f64::from(arm.simulation().plant().angle(Joint::ALL[0])) / 1e3
     }
@@ -121,7 +122,7 @@ mod tests {
         arm.send(&bytes);
         pass_without_replies(&mut client, &mut arm, 30);
         let stopped = base(&arm);
-        // It goes back to where it was read last, at 1.9 degrees per second.
+        // The joint returns to its last known position, at 1.9 degrees per second.
         pass_without_replies(&mut client, &mut arm, 300);
         let rested = base(&arm);
         assert_eq!(client.stop_progress(), StopProgress::Verifying, "nothing has confirmed it");
@@ -133,7 +134,7 @@ mod tests {
         assert!((base(&arm) - rested).abs() < 0.5, "from {rested} to {}", base(&arm));
     }
 
-    /// Plays a movement of joint 1 until it ends. `during` gets the number of each picture, and may break something.
+    /// Plays a movement of joint 1 to its end. Calls `during` before each picture with its number, for example to inject a fault.
     fn play(
         client: &mut Client,
         arm: &mut SimulatedSource,
@@ -209,7 +210,7 @@ mod tests {
         assert!(held.targets[0] < 140.0 && held.moving == 0, "{held:?}");
     }
 
-    /// A joint that is not measured yet holds only after it was measured: until then it goes where it was sent.
+    /// A joint that is not measured yet can hold only after it was measured. Until then it moves to its target.
     #[test]
     fn a_stop_during_start_up_waits_for_every_joint() {
         let (mut client, mut arm) = (Client::default(), SimulatedSource::default());

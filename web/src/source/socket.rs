@@ -1,4 +1,4 @@
-//! An arm behind `sevenbot view` or `sevenbot class`: a WebSocket whose binary messages carry the bytes of frames.
+//! An arm behind `sevenbot view` or `sevenbot class`, through a WebSocket whose binary messages carry the bytes of frames.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -25,7 +25,7 @@ struct Shared {
 }
 
 impl SocketSource {
-    /// Connects to the server that this page came from. The page's address has its token.
+    /// Connects to the server that this page came from, with the query of the page's address, which contains the token.
     ///
     /// # Errors
     /// The browser refuses the address.
@@ -72,7 +72,7 @@ impl Drop for SocketSource {
     fn drop(&mut self) {
         self.socket.set_onmessage(None);
         self.socket.set_onclose(None);
-        // It may be closed already.
+        // Ignore the error of a socket that is closed already.
         let _ = self.socket.close();
     }
 }
@@ -80,7 +80,7 @@ impl Drop for SocketSource {
 impl Source for SocketSource {
     fn send(&mut self, bytes: &[u8]) {
         if self.state() == LineState::Open && !bytes.is_empty() {
-            // A failure closes the socket, which is seen there.
+            // Ignore a failure here: it closes the socket, which sets the state.
             let _ = self.socket.send_with_u8_array(bytes);
         }
     }

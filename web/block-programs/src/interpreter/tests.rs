@@ -1,19 +1,19 @@
 use super::*;
 use crate::python;
 
-/// A program of these top blocks, and of the variables x and y.
+/// Parses a workspace with these top blocks, and with the variables x and y.
 fn program(blocks: &str) -> Result<Program, ProgramError> {
     Program::parse(&format!(
         r#"{{"blocks": {{"blocks": [{blocks}]}}, "variables": [{{"name": "x", "id": "vx"}}, {{"name": "y", "id": "vy"}}]}}"#
     ))
 }
 
-/// A stack of blocks below the start.
+/// The start block with these blocks below it, each without its last brace.
 fn start(blocks: &[String]) -> String {
     format!(r#"{{"type": "arm_start", "id": "start", "next": {}}}"#, stack(blocks))
 }
 
-/// A stack of blocks, each without its last brace.
+/// A connection to these blocks, one below the other. Each is given without its last brace, so that the next one can be added.
 fn stack(blocks: &[String]) -> String {
     let below = |below: String, block: &String| format!(r#"{{"block": {block}, "next": {below}}}}}"#);
     blocks.iter().rev().fold("null".to_owned(), below)
@@ -56,7 +56,7 @@ fn flow(kind: &str) -> String {
     block("controls_flow_statements", &format!(r#""fields": {{"FLOW": "{kind}"}}"#))
 }
 
-/// The seconds of all waits, until the end.
+/// Runs a program to its end. Returns the seconds of all waits.
 fn waits(blocks: &str) -> Result<Vec<f64>, ProgramError> {
     let mut run = Interpreter::new(&program(blocks)?);
     let mut waits = Vec::new();
