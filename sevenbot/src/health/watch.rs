@@ -27,7 +27,7 @@ pub(super) const STATE_REGISTERS: Span = Span::between(&MOTOR_STATE, &EFFECTOR_T
 /// The shortest time between two questions.
 const POLL_PERIOD: Duration = Duration::from_millis(100);
 /// A new alarm that no joint explains is a problem after this time.
-const ALARM_GRACE: Duration = Duration::from_secs(1);
+const ALARM_GRACE: Duration = Duration::from_secs(3);
 /// The questions and their answers take at most one part in this many of the line's capacity.
 const SHARE_OF_LINE: u32 = 10;
 /// Bits of a question and its answer on the line: 7 bytes each around the values, ten bits a byte.

@@ -81,7 +81,7 @@ impl SetPointStream<'_> {
             let health = self.arm().health().map_err(MoveError::from)?;
             let (now, away) = (self.arm().elapsed(), health.away_from_targets(joints));
             if away.is_empty() {
-                return Ok(());
+                return Ok(self.check_at_end().map_err(MoveError::from)?);
             }
             if now >= deadline {
                 return Err(MoveError::NotReached { away, missing: 0, retargeted: 0 }.into());

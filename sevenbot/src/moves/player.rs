@@ -151,7 +151,7 @@ impl Player {
             self.approach(arm, observer)?;
             check.check(arm)?;
             self.play_once(arm, observer)?;
-            check.check(arm)?;
+            check.check_at_end(arm)?;
             self.played = self.played.saturating_add(1);
         }
         Ok(())
