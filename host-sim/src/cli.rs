@@ -127,7 +127,7 @@ pub struct Options {
     #[arg(long, value_name = "ID,..", value_parser = ids, requires = "servos_only")]
     pub ids: Option<Ids>,
 
-    /// With --servos-only: how many milliseconds the adapter gathers bytes, as 16 or 1-20
+    /// With --servos-only: the milliseconds for which the adapter gathers bytes, such as 16 or 1-20
     #[arg(long, value_name = "MS", default_value = "0", requires = "servos_only")]
     pub usb_latency: Latency,
 

@@ -39,7 +39,7 @@ pub(crate) struct ConvertArgs {
     input: PathBuf,
     /// The file to write; - is standard output.
     output: PathBuf,
-    /// The format, if not that of OUTPUT's name.
+    /// The format, if OUTPUT's name does not tell it.
     #[arg(long, value_name = "FORMAT")]
     to: Option<FormatName>,
     #[command(flatten)]

@@ -28,7 +28,7 @@ use crate::watch::{ProgressWatch, note_rounding_of};
 
 /// Play a recorded movement.
 ///
-/// The whole file is checked before the arm moves, and that it begins within 5 degrees of where each joint stands. Ctrl-C
+/// Before the arm moves, the whole file is checked, and each joint has to stand within 5 degrees of where the file begins. Ctrl-C
 /// makes the arm hold its position.
 #[derive(Debug, Args)]
 #[command(after_help = "\

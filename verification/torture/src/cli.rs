@@ -26,7 +26,7 @@ EXIT STATUS
 )]
 pub struct CampaignArgs {
     #[command(subcommand)]
-    /// Another command than the simulation.
+    /// A command other than the simulation.
     pub command: Option<TortureCommand>,
 
     /// Virtual days to simulate [default: 30]
@@ -58,7 +58,7 @@ pub struct CampaignArgs {
     pub rows: bool,
 }
 
-/// Another command than the simulation.
+/// A command other than the simulation.
 #[derive(Clone, Debug, Subcommand)]
 pub enum TortureCommand {
     /// Saturate a port with requests and count the missing replies

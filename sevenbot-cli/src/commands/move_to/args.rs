@@ -11,7 +11,7 @@ use crate::session::Session;
 /// Move the tip to a point, in millimetres.
 ///
 /// The whole move is checked before the arm moves. If the point is out of reach, below the table or in the base, the error
-/// gives the nearest point that is none of these.
+/// gives the nearest point to which the arm can go.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:

@@ -75,7 +75,7 @@ enum SimCommand {
     },
     /// Restart the controller, as its watchdog does. The servos keep power, torque and goals.
     Restart,
-    /// Stop the controller, as a program that hangs, until `restart` or `power cycle`.
+    /// Stop the controller, as if its program hung, until `restart` or `power cycle`.
     Halt,
     /// Stop virtual time. The port is still served.
     Pause,
