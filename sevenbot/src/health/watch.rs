@@ -11,8 +11,8 @@
 use std::time::Duration;
 
 use protocol_core::registers::map::{
-    EFFECTOR_TYPE, FRAMES_ACCEPTED, MOTOR_STATE, SERVO_ALARMS, SERVO_TEMPERATURE, SET_POINT_PERIOD, effector,
-    motor_state,
+    EFFECTOR_TYPE, FAULTS, FRAMES_ACCEPTED, MOTOR_STATE, SERVO_ALARMS, SERVO_TEMPERATURE, SET_POINT_PERIOD,
+    effector, fault, motor_state,
 };
 
 use super::{ALARM_BITS, ALL_JOINTS, Problem, ProblemFlags, ProblemKind};
@@ -80,6 +80,8 @@ pub struct MoveWatch {
     needs_motors: bool,
     /// The joints that have been blocked since before the move.
     blocked_before: u8,
+    /// The bits of register 241 for a restart, at the last answer.
+    restarts_told: Option<u8>,
     /// The alarms at the first answer.
     alarms_before: Option<u8>,
     /// When other alarms came.
@@ -113,6 +115,7 @@ impl MoveWatch {
             joints,
             needs_motors: true,
             blocked_before: u8::MAX,
+            restarts_told: None,
             alarms_before: None,
             alarm_since: None,
             is_at_end: false,
@@ -247,7 +250,11 @@ impl MoveWatch {
         let newest = (self.answer_before, accepted);
         let (since, before) = self.accepted.replace(newest).unwrap_or(newest);
         let is_shared = SharingState::of(registers).is_some();
+        // The counter may not show it, if it was near its wrap.
+        let told = registers.byte(&FAULTS) & (fault::WATCHDOG_RESTART | fault::BROWN_OUT_RESTART);
+        let told_before = self.restarts_told.replace(told).unwrap_or(told);
         (self.has_other_period(registers) && !is_shared)
+            || told & !told_before != 0
             || has_restarted(before, accepted, self.frames_since(since))
     }
 
@@ -351,6 +358,13 @@ mod tests {
         // This answer may have come long before it was taken.
         assert_eq!(watch.registers(ms(60_100), &frames(50_000)), Ok(()));
         assert!(watch.registers(ms(60_200), &frames(50)).is_err(), "15,586 frames in 0.2 s");
+        let mut wrapping = MoveWatch::new(ms(0), 1, 115_200);
+        assert_eq!(wrapping.registers(ms(10), &frames(62_502)), Ok(()));
+        let mut restarted = frames(3);
+        restarted.values[usize::from(FAULTS.address)] = fault::WATCHDOG_RESTART;
+        assert!(wrapping.registers(ms(110), &restarted).is_err(), "the arm tells of it");
+        restarted.values[usize::from(FRAMES_ACCEPTED.address)] = 9;
+        assert_eq!(wrapping.registers(ms(210), &restarted), Ok(()), "once");
     }
 
     #[test]
