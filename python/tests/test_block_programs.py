@@ -29,7 +29,7 @@ ENOUGH = 120.0
 #: Seconds. On a busy machine an answer of the emulator may take longer than a program waits by itself.
 ANSWER_TIME = 20.0
 #: What happens on a machine that is too busy: the arm stops on its way, or its answers or those of its servos are late.
-BUSY = ("this program paused", "does not answer", "no servo answers", "no answer")
+BUSY = ("this program paused", "did not reach", "does not answer", "no servo answers", "no answer")
 
 
 def end_of(program: Path) -> list[float]:
