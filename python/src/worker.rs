@@ -169,13 +169,11 @@ impl Worker {
             let is_other_open = self.is_open() && error.is_instance_of::<Closed>(py);
             if is_other_open { Closed::raise_other_stream(py) } else { error }
         })?;
-        let is_interrupted = matches!(opened, (Ok(()), Some(_)));
-        let outcome = finish(py, opened);
-        if is_interrupted {
-            // The stream is open, and its caller leaves.
-            self.close_stream(py)?;
+        if matches!(opened, (Ok(()), Some(_))) {
+            // The caller leaves.
+            self.abandon_stream();
         }
-        outcome
+        finish(py, opened)
     }
 
     /// Closes a stream that its caller has forgotten, without a wait.

@@ -232,3 +232,17 @@ def test_other_threads_run_during_a_step() -> None:
         count += 1
     thread.join()
     assert count > 100
+
+
+def test_an_arm_of_many_answers_at_once_whatever_its_snapshot_was() -> None:
+    with sevenbot.Arm.simulated(3) as one:
+        one.sleep(1)
+        arms = sevenbot.SimulatedArms(1)
+        arms.reset(None, one.simulation.snapshot())
+        seen = arms.read()
+        assert seen[0, arms.POSITIONS] == pytest.approx(one.simulation.angles, abs=1.0)
+        assert seen[0, arms.AGE] == 0.0
+        one.simulation.restore(arms.snapshot(0))
+        before = one.simulation.now
+        one.observe()
+        assert one.simulation.now - before > 0.003, "its own line takes time"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import math
 from typing import Any
 
 import numpy
@@ -117,3 +119,13 @@ def test_seeds_are_checked_and_may_be_of_numpy() -> None:
     for count in (0, 3):
         with pytest.raises(ValueError, match="one for each of 2 arms"):
             envs.reset(seed=[1] * count)
+
+
+@pytest.mark.parametrize("goal", [(1, 2, math.nan), 5, (0, 185), "near"])
+def test_a_goal_has_three_finite_numbers(goal: object) -> None:
+    with contextlib.closing(sevenbot.gym.ReachEnv()) as env:
+        with pytest.raises(ValueError, match=r"goal: .*\(3,\)"):
+            env.reset(options={"goal": goal})
+    with contextlib.closing(sevenbot.gym.ReachVectorEnv(num_envs=2)) as envs:
+        with pytest.raises(ValueError, match=r"goals: .*\(2, 3\)"):
+            envs.reset(options={"goals": [goal, goal]})

@@ -194,3 +194,12 @@ def test_a_joint_that_is_dragged_away_does_not_hold(
     simulated_arm.sleep(0.2)
     with pytest.raises(sevenbot.MayMove, match="joint 2 is at 0"):
         hold(simulated_arm)
+
+
+def test_samples_and_recordings_wait_for_the_first_measurement() -> None:
+    with sevenbot.Arm.simulated() as arm:
+        _, rows = arm.sample(3)
+        assert rows[0] == pytest.approx(REST, abs=3)
+    with sevenbot.Arm.simulated() as arm:
+        recording = arm.record(1)
+        assert recording.angles[0] == pytest.approx(REST, abs=3)

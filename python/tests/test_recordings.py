@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import csv
 import math
+import os
+import pickle
+import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +21,9 @@ import sevenbot
 
 REST = [90.0, 90.0, 65.0, 90.0, 90.0, 90.0, 80.0]
 COUNT = 250
+PROGRAMS = os.environ.get("SEVENBOT_PROGRAMS")
+#: Seconds. No test fails because a machine is slow.
+ENOUGH = 120.0
 
 
 @pytest.fixture
@@ -111,3 +117,15 @@ def test_other_files_are_refused(tmp_path: Path) -> None:
     path.write_text("time,joint_1\n0,90\n")
     with pytest.raises(sevenbot.BadRecording, match="not a recording"):
         sevenbot.Recording.load(path)
+
+
+@pytest.mark.skipif(PROGRAMS is None, reason="SEVENBOT_PROGRAMS names no folder with programs")
+def test_a_recording_from_mcap_equals_its_copy(tmp_path: Path) -> None:
+    text, mcap = tmp_path / "a.txt", tmp_path / "a.mcap"
+    words = [f"{PROGRAMS}/sevenbot", "--port", "sim", "record", str(text), "--driven", "--yes", "--seconds", "1"]
+    subprocess.run([*words, "--mcap", str(mcap)], check=True, timeout=ENOUGH)
+    loaded = sevenbot.Recording.load(mcap)
+    assert loaded == pickle.loads(pickle.dumps(loaded)) == loaded[:] == sevenbot.Recording.load(text)
+    same = subprocess.run([*words, "--mcap", str(text)], capture_output=True, text=True, timeout=ENOUGH)
+    assert same.returncode != 0 and "two files" in same.stderr
+    assert sevenbot.Recording.load(text) == loaded, "nothing is lost"

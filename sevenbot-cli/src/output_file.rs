@@ -70,8 +70,19 @@ pub(crate) fn check_replaceable(path: &Path, force: ForceArg) -> Result<(), Comm
     Ok(())
 }
 
-fn is_same(one: &Path, other: &Path) -> bool {
-    fs::canonicalize(one).is_ok_and(|one| fs::canonicalize(other).is_ok_and(|other| one == other))
+/// Do both paths name one file, which need not exist?
+pub(crate) fn is_same(one: &Path, other: &Path) -> bool {
+    place(one).is_ok_and(|one| place(other).is_ok_and(|other| one == other))
+}
+
+/// The path of a file without links, or the path that it would have.
+fn place(path: &Path) -> io::Result<PathBuf> {
+    if let Ok(place) = fs::canonicalize(path) {
+        return Ok(place);
+    }
+    let path = std::path::absolute(path)?;
+    let folder = fs::canonicalize(path.parent().unwrap_or(&path))?;
+    Ok(folder.join(path.file_name().unwrap_or_default()))
 }
 
 #[cfg(test)]
@@ -105,5 +116,7 @@ mod tests {
         let other_name = folder.path().join(".").join("move.txt");
         assert!(OutputFile::open(&other_name, Some(&path), FORCE).is_err());
         assert_eq!(fs::read(&path).expect("a file"), b"years");
+        let new = |name: &str| folder.path().join(name).join("new.txt");
+        assert!(is_same(&new("."), &new("")) && !is_same(&new("."), &path), "files that are not there yet");
     }
 }

@@ -4,13 +4,13 @@
 //! and finally its bytes stay in the connection. Its writes are carried out unless they are behind a read that waits
 //! ([D5](protocol_core::decisions#d5)).
 
+use protocol_core::report_kind::ReportKind;
 use protocol_core::request::{Reply, Report};
 use protocol_core::time::Instant;
 use protocol_core::wire::deframer::gap;
 use protocol_core::wire::{Deframer, FrameBuffer, Function, MAX_LENGTH, ToArm};
 
 use crate::hub::{ClientId, Event, Hub, WholeRequest};
-use protocol_core::report_kind::ReportKind;
 
 /// Bytes for the client beyond which reports are dropped: at 50 Hz, 1.4 s of reports of 14 bytes, or 0.4 s of the longest ones,
 /// 49 bytes.

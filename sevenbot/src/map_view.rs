@@ -33,10 +33,6 @@ const OFFSET_ZERO: u8 = 128;
 /// A byte that is no offset in any encoding of map 2.1.
 const NO_OFFSET: u8 = 64;
 
-/// The registers in the reports of map 2.2, by the value of register 189 (D26).
-pub(crate) const REPORTS: [Span; 3] =
-    [Span::of(&PRESENT_POSITION), Span::of(&FINE_POSITION), Span::between(&FINE_POSITION, &LOAD)];
-
 /// The extended block and the protection block.
 const OUR_BLOCKS: RangeInclusive<u8> = FINE_TARGET.address..=PROTECTION_VERSION.address;
 
@@ -149,7 +145,16 @@ impl MapView {
     /// The ranges of registers that a report may hold.
     pub(crate) const fn reports(self) -> &'static [Span] {
         match self.map {
-            Map::V22 => &REPORTS,
+            // By the value of register 189 (D26).
+            Map::V22 => {
+                const {
+                    &[
+                        Span::of(&PRESENT_POSITION),
+                        Span::of(&FINE_POSITION),
+                        Span::between(&FINE_POSITION, &LOAD),
+                    ]
+                }
+            }
             Map::V21 => const { &[Span::of(&PRESENT_ANGLE)] },
         }
     }

@@ -4,13 +4,14 @@
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-use protocol_core::registers::map::{FINE_POSITION, PRESENT_POSITION, report_content};
+use protocol_core::registers::map::{FINE_POSITION, PRESENT_POSITION};
 use protocol_core::registers::map21::Map;
+use protocol_core::report_kind::ReportKind;
 
 use crate::fine_angle::FineAngle;
 use crate::fine_state::FineState;
 use crate::identity::Firmware;
-use crate::map_view::{MapView, REPORTS};
+use crate::map_view::MapView;
 use crate::units::Angle;
 use host_link::{Snapshot, Span};
 
@@ -98,16 +99,11 @@ impl ReportQueue {
     }
 }
 
-/// The time between two reports of this content, see [`report_content`], at this frequency and baud rate.
+/// The time between two reports of this content, see [`ReportKind::of_content`], at this frequency and baud rate.
 pub(crate) fn report_period(firmware: Firmware, hertz: u8, content: u8, baud: u32) -> Duration {
     let hertz = u32::from(hertz.max(1));
-    let [positions, fine_positions, fine_state] = REPORTS;
-    let span = match content {
-        report_content::FINE_POSITIONS => fine_positions,
-        report_content::FINE_STATE => fine_state,
-        _ => positions,
-    };
-    let bits = BITS_PER_BYTE * (REPORT_OVERHEAD + u32::from(span.count()));
+    let (_, count) = ReportKind::of_content(content).registers();
+    let bits = BITS_PER_BYTE * (REPORT_OVERHEAD + u32::from(count));
     match firmware {
         // The maker's firmware sends a report when more than 1000 ms / hertz have passed.
         Firmware::Makers => Duration::from_millis(u64::from(1_000 / hertz) + 1),

@@ -217,9 +217,9 @@ impl<'a> SetPointStream<'a> {
         self.check.check(self.arm)
     }
 
-    /// As [`Self::check_now`], when the joints have arrived: an alarm that came last is told, too.
-    pub(crate) fn check_at_end(&mut self) -> Result<(), MoveCheckError> {
-        self.check.check_at_end(self.arm)
+    /// See [`MoveWatch::end`](crate::health::MoveWatch::end).
+    pub(crate) const fn end_check(&mut self) {
+        self.check.end();
     }
 
     /// Begins anew on an arm that is not where it was, such as a simulated one that was restored: sets period and watchdog again,

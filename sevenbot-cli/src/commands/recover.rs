@@ -11,7 +11,7 @@ use clap::Args;
 use serde::Serialize;
 use sevenbot::health::{ProblemKind, sentences};
 use sevenbot::map::{MOTOR_STATE, motor_state};
-use sevenbot::moves::MoveError;
+use sevenbot::moves::{HELD_DEGREES, MoveError};
 use sevenbot::{Arm, Health, Problem};
 
 use super::status::ArmStatus;
@@ -61,8 +61,6 @@ const RECOVERY_TIMEOUT: Duration = Duration::from_secs(6);
 /// (D27).
 const QUIET_TIME: Duration = Duration::from_secs(2);
 const POLL_PERIOD: Duration = Duration::from_millis(100);
-/// A joint this near to its target holds, in degrees: a load makes it droop.
-const HELD_DEGREES: u8 = 10;
 /// How long the motors are off to end an overload (forceless, then servo).
 const OFF_TIME: Duration = Duration::from_millis(500);
 

@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 
 use host_link::sharing::Command;
 use protocol_core::registers::Map;
+use protocol_core::report_kind::ReportKind;
 use protocol_core::time::{Duration, Instant};
 
 use super::drive::Driving;
@@ -14,7 +15,6 @@ use super::readings::Readings;
 use super::request::WholeRequest;
 use super::schedule::Schedule;
 use super::shares::Share;
-use protocol_core::report_kind::ReportKind;
 
 /// Requests of one client that may wait. The maker's arm has the same limit for its WebSocket.
 pub(crate) const MOST_WAITING: usize = 20;

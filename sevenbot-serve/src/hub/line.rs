@@ -8,12 +8,12 @@ use std::collections::{BTreeMap, VecDeque};
 use host_link::{HostEvent, HostLink, LinkOptions, Patience, RequestId, Snapshot, Span};
 use protocol_core::registers::Map;
 use protocol_core::registers::map::{FINE_POSITION, LOAD, PRESENT_POSITION};
+use protocol_core::report_kind::ReportKind;
 use protocol_core::time::{Duration, Instant};
 
 use super::client::{Client, Event};
 use super::client_id::ClientId;
 use super::request::{WholeRequest, reply_bytes};
-use protocol_core::report_kind::ReportKind;
 
 /// For reads of clients. If a reply is late, the read is repeated after 100 ms or more, unless something was written since. So
 /// a lost frame delays its client, and those that wait for the line, only by that time. The read is given up after 3 s only,

@@ -6,7 +6,6 @@
 use protocol_core::registers::map::{FEEDBACK_FREQUENCY, OFFSET, REPORT_CONTENT};
 use protocol_core::registers::map21::{ANGLE_FEEDBACK_FREQUENCY, LOAD_FEEDBACK_FREQUENCY};
 use protocol_core::registers::{Map, Register};
-
 use protocol_core::report_kind::ReportKind;
 
 /// The values of a client's own registers.

@@ -3,13 +3,13 @@
 //! Reads are used, and not the arm's reports, for three reasons. A report of map 2.2 looks like the reply to a read.
 //! The arm ends the streams of one map when the other map is written. And every arm can be read.
 
+use protocol_core::report_kind::ReportKind;
 use protocol_core::time::Instant;
 
 use super::own_registers::OwnRegisters;
 use super::request::reply_bytes;
 use super::schedule::Timer;
 use super::shares::Share;
-use protocol_core::report_kind::ReportKind;
 
 /// Reads the arm for all clients.
 #[derive(Debug)]

@@ -1,9 +1,9 @@
 //! When reports are due.
 
+use protocol_core::report_kind::ReportKind;
 use protocol_core::time::{Duration, Instant};
 
 use super::own_registers::OwnRegisters;
-use protocol_core::report_kind::ReportKind;
 
 /// How early a report may come: half of the shortest period of 10 ms.
 const EARLY: Duration = Duration::from_millis(5);

@@ -2,6 +2,7 @@
 
 use protocol_core::registers::Map;
 use protocol_core::registers::map::{OFFSET, SPEED};
+use protocol_core::report_kind::ReportKind;
 use protocol_core::time::Instant;
 
 use super::Hub;
@@ -13,7 +14,6 @@ use super::own_registers::covers;
 use super::request::{WholeRequest, read_bytes, without_idle_ends};
 use super::shares::Shares;
 use super::watchdog::ClientWatchdog;
-use protocol_core::report_kind::ReportKind;
 
 impl Hub {
     /// Sends urgent requests, and what the hub needs to hold the arm. They wait for no other frame.

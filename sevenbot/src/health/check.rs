@@ -125,13 +125,9 @@ impl MoveCheck {
         }))
     }
 
-    /// As [`Self::check`], for the last time.
-    ///
-    /// # Errors
-    /// As [`Self::check`].
-    pub fn check_at_end(&mut self, arm: &mut Arm) -> Result<(), MoveCheckError> {
+    /// See [`MoveWatch::end`].
+    pub(crate) const fn end(&mut self) {
         self.0.end();
-        self.check(arm).map(drop)
     }
 
     /// Checks the answer that has arrived, and asks again when it is time. Waits only after a fault, to read its cause.

@@ -168,7 +168,7 @@ impl MoveWatch {
     }
 
     /// From now on a new alarm is a problem at once, because no later check would see it.
-    pub(super) const fn end(&mut self) {
+    pub const fn end(&mut self) {
         self.is_at_end = true;
     }
 

@@ -74,6 +74,7 @@ impl SetPointStream<'_> {
             }
             next = now + self.period();
         }
+        self.end_check();
         let deadline = self.arm().elapsed() + SETTLE_TIMEOUT;
         loop {
             self.check_now().map_err(MoveError::from)?;
@@ -81,7 +82,7 @@ impl SetPointStream<'_> {
             let health = self.arm().health().map_err(MoveError::from)?;
             let (now, away) = (self.arm().elapsed(), health.away_from_targets(joints));
             if away.is_empty() {
-                return Ok(self.check_at_end().map_err(MoveError::from)?);
+                return Ok(());
             }
             if now >= deadline {
                 return Err(MoveError::NotReached { away, missing: 0, retargeted: 0 }.into());

@@ -26,7 +26,7 @@ const POLL_PERIOD: Duration = Duration::from_millis(50);
 const OWN_TARGET_DEGREES: u8 = 4;
 /// A joint that is further than this from its target, and further than at the start, does not hold. A loaded joint droops by
 /// up to 1.5 degrees, and one that was stopped at speed comes back to its target.
-const HELD_DEGREES: u8 = 10;
+pub const HELD_DEGREES: u8 = 10;
 
 impl Arm {
     /// As [`Arm::hold`], and then [`Arm::watch_hold`] if the motors drive the joints.

@@ -249,7 +249,8 @@ impl JointMove {
         }
         match self.away(&last, TOLERANCE_DEGREES, state).as_slice() {
             [] => {
-                check.check_at_end(arm)?;
+                check.end();
+                check.check(arm)?;
                 Ok(last)
             }
             away => Err(self.not_reached(arm, away.to_vec())),

@@ -24,6 +24,7 @@ mod report_session;
 mod tip_move;
 
 pub use error::{ConnectionLost, MoveError};
+pub use hold_watch::HELD_DEGREES;
 pub use joint_move::{JointMove, Targets};
 pub use observer::{Observer, Stage};
 pub use pace::{Pace, PaceBefore};

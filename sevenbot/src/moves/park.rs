@@ -148,7 +148,7 @@ impl Arm {
         loop {
             let now = self.park_positions()?;
             check.check(self).map_err(MoveError::from)?;
-            if self.joints()?.motor_state() != motor_state::DAMPING {
+            if self.read_span(Span::of(&MOTOR_STATE))?.byte(&MOTOR_STATE) != motor_state::DAMPING {
                 return Err(MoveError::Problems(vec![Problem::of_arm(ProblemKind::Restarted)]).into());
             }
             if self.now() >= begin + SETTLING_TIME {

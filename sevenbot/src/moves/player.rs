@@ -147,11 +147,12 @@ impl Player {
     ) -> Result<(), MoveError> {
         // Checks between the moves. Each move has a check of its own.
         let mut check = MoveCheck::begin(arm, 0)?;
+        check.end();
         while times == 0 || self.played < times {
             self.approach(arm, observer)?;
             check.check(arm)?;
             self.play_once(arm, observer)?;
-            check.check_at_end(arm)?;
+            check.check(arm)?;
             self.played = self.played.saturating_add(1);
         }
         Ok(())

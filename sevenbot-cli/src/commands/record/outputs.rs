@@ -11,6 +11,7 @@ use sevenbot::recording::{FileVersion, Moment, RecordingLines};
 
 use crate::command_error::CommandError;
 use crate::line_file::LineFile;
+use crate::output_file::is_same;
 use crate::printer::note;
 
 /// The files of a recording. All of them get the same moments.
@@ -35,7 +36,7 @@ impl Outputs {
         version: FileVersion,
     ) -> Result<Self, CommandError> {
         if let (Some(text), Some(mcap)) = (text, mcap)
-            && is_same_file(text, mcap)
+            && is_same(text, mcap)
         {
             return Err(CommandError::file(mcap, "the text and the MCAP recording need two files"));
         }
@@ -131,19 +132,6 @@ impl McapFile {
     ) -> Result<(), CommandError> {
         write(&mut self.writer).map_err(|error| failed(&self.path, error))
     }
-}
-
-/// Do both names mean one file, that is there or not?
-fn is_same_file(one: &Path, other: &Path) -> bool {
-    let folder = |path: &Path| match path.parent() {
-        Some(parent) if parent != Path::new("") => parent.canonicalize(),
-        _ => Path::new(".").canonicalize(),
-    };
-    let place = |path: &Path| {
-        path.canonicalize()
-            .or_else(|_| Ok::<_, io::Error>(folder(path)?.join(path.file_name().unwrap_or_default())))
-    };
-    matches!((place(one), place(other)), (Ok(one), Ok(other)) if one == other)
 }
 
 fn failed(path: &Path, error: io::Error) -> CommandError {
