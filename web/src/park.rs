@@ -12,7 +12,7 @@ use sevenbot::fine::FineTargets;
 use sevenbot::health::{Health, MoveFault, MoveWatch};
 use sevenbot::map::{MOTOR_STATE, SPEED, motor_state};
 use sevenbot::moves::park_way;
-use sevenbot::{FineAngle, Joint, Snapshot};
+use sevenbot::{FineAngle, Joint, Problem, ProblemKind, Snapshot};
 
 use crate::arm_state::{ArmState, target_frame};
 use crate::client::{BAUD, Client};
@@ -72,8 +72,8 @@ enum Stage {
     Beginning(u64),
     /// The remaining parts of the path, the current one last, and the time and round of reads at which it was sent.
     Way(Vec<FineTargets>, Option<(Instant, u64)>),
-    /// The angles in degrees and the time at which the arm was let go.
-    LetGo([f32; 7], Instant),
+    /// The angles in degrees and the time at which the arm was let go, and the round of reads that shows it.
+    LetGo([f32; 7], Instant, u64),
 }
 
 /// A park in progress.
@@ -131,6 +131,9 @@ impl Park {
                         client.write(now, SPEED.address, &self.speeds());
                     }
                     (Stage::Way(..), _) => client.stop(now, Some(self.speeds())),
+                    (Stage::LetGo(..), failure) if holds_again(failure) => {
+                        client.write(now, MOTOR_STATE.address, &[motor_state::SERVO]);
+                    }
                     _ => {}
                 }
                 ParkProgress::Failed(failure)
@@ -139,13 +142,9 @@ impl Park {
     }
 
     fn advance(&mut self, now: Instant, client: &mut Client) -> Result<ParkProgress, ParkFailure> {
-        match self.stage {
-            Stage::Start => {
-                start_anew(now, client);
-                self.stage = Stage::Beginning(client.rounds() + ROUNDS_TO_KNOW);
-            }
-            Stage::LetGo(start, since) => return watch_parked(now, client, start, since),
-            _ => {}
+        if matches!(self.stage, Stage::Start) {
+            start_anew(now, client);
+            self.stage = Stage::Beginning(client.rounds() + ROUNDS_TO_KNOW);
         }
         self.check(now, client)?;
         let state = client.state();
@@ -174,9 +173,14 @@ impl Park {
                 (_, None) => {
                     client.write(now, SPEED.address, &self.before.joints(&SPEED));
                     client.write(now, MOTOR_STATE.address, &[motor_state::DAMPING]);
-                    self.stage = Stage::LetGo(state.angles(), now);
+                    self.watch = MoveWatch::new(since_start(now), ALL_JOINTS, BAUD).of_positions();
+                    self.stage = Stage::LetGo(state.angles(), now, client.rounds() + ROUNDS_TO_KNOW);
                 }
             },
+            Stage::LetGo(start, since, round) => {
+                let is_known = client.rounds() >= *round;
+                return watch_parked(now, &state, start, *since, is_known);
+            }
             _ => {}
         }
         Ok(ParkProgress::Moving)
@@ -209,18 +213,33 @@ fn way(state: &ArmState) -> Result<Vec<FineTargets>, ParkFailure> {
     Ok(way)
 }
 
+/// `is_known`: the registers are newer than the write that let the arm go.
 fn watch_parked(
     now: Instant,
-    client: &mut Client,
-    start: [f32; 7],
+    state: &ArmState,
+    start: &[f32; 7],
     since: Instant,
+    is_known: bool,
 ) -> Result<ParkProgress, ParkFailure> {
-    let angles = client.state().angles();
-    if start.iter().zip(angles).any(|(before, after)| (before - after).abs() > STAYS) {
-        client.write(now, MOTOR_STATE.address, &[motor_state::SERVO]);
+    if is_known && state.motor_state != motor_state::DAMPING {
+        let restarted = Problem::of_arm(ProblemKind::Restarted);
+        return Err(MoveFault::Problems(vec![restarted]).into());
+    }
+    if start.iter().zip(state.angles()).any(|(before, after)| (before - after).abs() > STAYS) {
         return Err(ParkFailure::Sank);
     }
     Ok(if now >= since + WATCH_TIME { ParkProgress::Parked } else { ParkProgress::Moving })
+}
+
+/// Do the motors drive an arm again that was let go? Not after a failure of the whole arm, such as a lost supply.
+fn holds_again(failure: &ParkFailure) -> bool {
+    match failure {
+        ParkFailure::Sank | ParkFailure::Move(PlayFailure::Paused(_)) => true,
+        ParkFailure::Move(PlayFailure::Arm(MoveFault::Problems(problems))) => {
+            problems.iter().all(|problem| problem.joint.is_some())
+        }
+        _ => false,
+    }
 }
 
 fn frames(client: &Client, targets: &FineTargets) -> Vec<(u8, Vec<u8>)> {
@@ -240,111 +259,4 @@ fn has_arrived(state: &ArmState, targets: &FineTargets) -> bool {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::stop::StopProgress;
-    use crate::tab::Tab;
-    use crate::texts::Language;
-    use crate::words::park_failure;
-
-    /// Runs a park to its end. Calls `during` before each picture with its number, for example to inject a fault.
-    fn park(tab: &mut Tab, mut during: impl FnMut(u32, &mut Tab)) -> ParkProgress {
-        let mut park = Park::new(tab.client.registers().clone(), tab.now());
-        for picture in 0..4_000 {
-            during(picture, tab);
-            match park.poll(tab.now(), &mut tab.client) {
-                ParkProgress::Moving => tab.pass(1),
-                end => return end,
-            }
-        }
-        panic!("it does not end: {park:?}");
-    }
-
-    #[test]
-    fn an_arm_is_parked_and_has_the_speeds_of_before() {
-        let mut tab = Tab::new();
-        let before = tab.registers();
-        assert_eq!(park(&mut tab, |_, _| ()), ParkProgress::Parked);
-        assert_eq!((tab.client.state().motor_state, tab.registers()), (motor_state::DAMPING, before));
-    }
-
-    #[test]
-    fn a_park_that_fails_says_why_and_the_joints_hold() {
-        for (action, word) in [
-            ("fault 1=missing", "Joint 1 does not answer"),
-            ("fault 3=stuck", "Joint 3 is blocked"),
-            ("fault supply=off", "does not answer"),
-            ("power-cycle", "restarted"),
-            ("halt", "does not answer"),
-        ] {
-            let mut tab = Tab::new();
-            let before = tab.registers();
-            let end = park(&mut tab, |picture, tab| {
-                if picture == 60 {
-                    tab.act(action);
-                }
-            });
-            let ParkProgress::Failed(failure) = end else { panic!("{action}: {end:?}") };
-            let words = park_failure(Language::English, &failure);
-            assert!(words.starts_with("Not parked:") && words.contains(word), "{action}: {words}");
-            assert_ne!(tab.client.stop_progress(), StopProgress::None, "{action}: the arm is told to hold");
-            tab.pass(60);
-            let held = tab.angles();
-            tab.pass(120);
-            if !matches!(action, "halt" | "fault supply=off") {
-                let moved = held.iter().zip(tab.angles()).map(|(held, end)| (held - end).abs());
-                assert!(moved.fold(0.0, f64::max) < 0.5, "{action}: {held:?} to {:?}", tab.angles());
-                assert_eq!(tab.registers(), before, "{action}");
-            }
-        }
-    }
-
-    #[test]
-    fn nothing_is_written_to_an_arm_that_cannot_be_parked() {
-        for (action, word) in
-            [("motors", "The motors are off."), ("fault 3=missing", "Joint 3 does not answer")]
-        {
-            let mut tab = Tab::new();
-            if action == "motors" {
-                tab.client.write(tab.now(), MOTOR_STATE.address, &[motor_state::FORCELESS]);
-            } else {
-                tab.act(action);
-            }
-            tab.pass(60);
-            let written = tab.client.frames().count();
-            let ParkProgress::Failed(failure) = park(&mut tab, |_, _| ()) else { panic!("{action}") };
-            let words = park_failure(Language::English, &failure);
-            assert!(words.contains(word), "{action}: {words}");
-            assert_eq!(tab.client.frames().count(), written, "{action}");
-        }
-    }
-
-    #[test]
-    fn a_page_that_pauses_ends_its_park() {
-        let mut tab = Tab::new();
-        let end = park(&mut tab, |picture, tab| {
-            if picture == 60 {
-                (0..200).for_each(|_| tab.arm.advance(10_000.0, || true));
-            }
-        });
-        assert!(matches!(end, ParkProgress::Failed(ParkFailure::Move(PlayFailure::Paused(_)))), "{end:?}");
-    }
-
-    #[test]
-    fn a_park_that_something_else_ends_leaves_no_joint_that_goes_on() {
-        let mut tab = Tab::new();
-        let before = tab.registers();
-        let mut park = Park::new(tab.client.registers().clone(), tab.now());
-        for _ in 0..90 {
-            assert_eq!(park.poll(tab.now(), &mut tab.client), ParkProgress::Moving);
-            tab.pass(1);
-        }
-        assert_ne!(tab.client.state().moving, 0);
-        let at_end = tab.angles();
-        park.end(tab.now(), &mut tab.client);
-        tab.pass(120);
-        let moved = at_end.iter().zip(tab.angles()).map(|(end, now)| (end - now).abs());
-        assert!(moved.fold(0.0, f64::max) < 2.0, "{at_end:?} to {:?}", tab.angles());
-        assert_eq!(tab.registers(), before);
-    }
-}
+mod tests;

@@ -70,8 +70,8 @@ impl JointMove {
         }
         self.round = client.rounds();
         let (now, registers) = (since_start(now), client.registers());
-        self.watch.registers(now, registers)?;
         let (health, state) = (Health::new(registers), client.state());
+        self.watch.registers(now, registers)?;
         let other = self.other_targets(&health);
         if std::mem::replace(&mut self.has_other_targets, !other.is_empty()) && !other.is_empty() {
             return Err(ProgramFailure::OtherTargets(other));
@@ -85,16 +85,23 @@ impl JointMove {
             return if now < self.end { Ok(false) } else { Err(not_reached(away)) };
         }
         if away.is_empty() && self.is_still(&state) {
-            return Ok(true);
+            return self.arrived(now, registers);
         }
         let since = *self.resting.get_or_insert(now);
         // Firmware without a status block does not report which joints move, so the timeout of the whole move applies.
         let end = if health.faults.is_some() { since + SETTLE_TIME } else { self.end };
         match (now < end, away.is_empty()) {
             (true, _) => Ok(false),
-            (false, true) => Ok(true),
+            (false, true) => self.arrived(now, registers),
             (false, false) => Err(not_reached(away)),
         }
+    }
+
+    /// Returns true unless these registers show a new alarm, which no later check would see.
+    fn arrived(&mut self, now: Duration, registers: &Snapshot) -> Result<bool, ProgramFailure> {
+        self.watch.end();
+        self.watch.registers(now, registers)?;
+        Ok(true)
     }
 
     /// The joints whose targets in the registers differ from these, except the claw: something else moves them.

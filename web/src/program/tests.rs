@@ -76,6 +76,8 @@ fn a_program_ends_where_the_arm_does_not_carry_it_out() {
         ("fault supply=off", "does not answer"),
         ("power-cycle", "restarted"),
         ("halt", "does not answer"),
+        // Of a joint that the program does not move.
+        ("trip 7", "overload"),
     ] {
         let mut tab = Tab::new();
         let (end, run) = tab.run(&long_move(), |picture, tab| {
