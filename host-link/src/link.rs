@@ -202,7 +202,12 @@ impl HostLink {
             match found.map(Message::from) {
                 Ok(Message::Reply(values)) => self.take_reply(values),
                 Ok(Message::Other(event)) => self.events.push_back(event),
-                Err(defect) => self.events.push_back(HostEvent::Damaged(defect)),
+                Err(defect) => {
+                    self.events.push_back(HostEvent::Damaged(defect));
+                    if let Some(id) = self.pending.note_damage(self.heard_until) {
+                        self.open.note_damage(id, self.heard_until);
+                    }
+                }
             }
         }
     }

@@ -48,7 +48,7 @@ pub(crate) struct OpenRead {
     pub(crate) id: RequestId,
     pub(crate) wanted: Span,
     pub(crate) patience: Patience,
-    /// How often it was sent.
+    /// How often it was sent and nothing came.
     sent: u32,
     /// How many writes were sent before it.
     writes_before: u64,
@@ -106,6 +106,15 @@ impl OpenReads {
 
     pub(crate) fn take_all(&mut self) -> impl Iterator<Item = OpenRead> {
         self.0.drain(..)
+    }
+
+    /// The reply to this read came at `now` and was damaged, so nothing more is waited for. It does not count as an attempt:
+    /// the arm answers in time.
+    pub(crate) fn note_damage(&mut self, id: RequestId, now: Instant) {
+        let damaged = self.0.iter_mut().find(|read| read.id == id && read.patience.repeats());
+        if let Some(read) = damaged {
+            (read.sent, read.due) = (read.sent.saturating_sub(1), read.due.min(now));
+        }
     }
 
     /// Takes out a read whose time has come at `now`. `writes` counts all writes so far.

@@ -27,6 +27,8 @@ struct SentRead {
     asked: Span,
     /// When its reply has arrived, if the arm answers at once.
     due: Instant,
+    /// Did a damaged frame come when the reply was due?
+    is_damaged: bool,
 }
 
 /// The reads without a reply, oldest first. A read that was repeated is there several times.
@@ -58,7 +60,7 @@ impl PendingReads {
 
     /// A read was sent. Its reply is due at this time.
     pub(crate) fn add(&mut self, id: RequestId, asked: Span, due: Instant) {
-        self.0.push_back(SentRead { id: Some(id), asked, due });
+        self.0.push_back(SentRead { id: Some(id), asked, due, is_damaged: false });
     }
 
     /// The read is given up, or answered.
@@ -83,14 +85,21 @@ impl PendingReads {
         Some(Matched { id, due, lost })
     }
 
+    /// A damaged frame came at `now`: the reply to the oldest read that is due by then, which is returned.
+    pub(crate) fn note_damage(&mut self, now: Instant) -> Option<RequestId> {
+        let read = self.0.iter_mut().find(|read| read.id.is_some() && !read.is_damaged)?;
+        read.is_damaged = read.due <= now;
+        read.id.filter(|_| read.is_damaged)
+    }
+
     /// Is a reply to this read still possible?
     pub(crate) fn awaits(&self, id: RequestId) -> bool {
         self.0.iter().any(|read| read.id == Some(id))
     }
 
-    /// The ranges of the reads that were not given up.
+    /// The ranges of the reads whose replies are on their way.
     pub(crate) fn awaited(&self) -> impl Iterator<Item = Span> {
-        self.0.iter().filter(|read| read.id.is_some()).map(|read| read.asked)
+        self.0.iter().filter(|read| read.id.is_some() && !read.is_damaged).map(|read| read.asked)
     }
 
     fn has(&self, span: &Span, test: impl Fn(&SentRead) -> bool) -> bool {

@@ -60,27 +60,61 @@ fn replied(id: RequestId, address: u8, values: &[u8]) -> HostEvent {
     HostEvent::Reply(id, Snapshot { address, values: values.to_vec() })
 }
 
-#[test]
-fn a_damaged_reply_costs_a_round_trip() {
-    let mut link = link(115_200);
-    let id = link.read(span(29, 3), PATIENCE);
-    assert_eq!(sent(&mut link, at_ms(0)), (29, 3));
-    let mut damaged = reply(29, &[1, 2, 3]);
-    damaged[6] ^= 1;
-    link.bytes(at_ms(2), &damaged);
-    assert!(matches!(events(&mut link, at_ms(2)).0.as_slice(), [HostEvent::Damaged(_)]));
-    let (repeated, when) = next_after_silence(&mut link, at_ms(2));
-    assert!(
-        matches!(repeated.as_slice(), [HostEvent::Send(frame)] if frame[3..5] == [29, 4]),
-        "{repeated:?}"
-    );
-    assert!((100..105).contains(&(when.as_micros() / 1_000)), "{when:?}");
-    link.bytes(when, &reply(29, &[1, 2, 3, 4]));
-    assert_eq!(events(&mut link, when).0, [replied(id, 29, &[1, 2, 3])]);
+/// A reply to a read of registers 29 to 31 whose checksum is wrong.
+fn damaged() -> Vec<u8> {
+    let mut frame = reply(29, &[1, 2, 3]);
+    frame[6] ^= 1;
+    frame
 }
 
 #[test]
-fn a_damaged_reply_costs_little_on_a_line_that_is_in_time_and_several_are_no_error() {
+fn a_damaged_reply_is_asked_for_again_at_once_and_so_are_its_repeats() {
+    let mut link = link(115_200);
+    let id = link.read(span(29, 3), PATIENCE);
+    assert_eq!(sent(&mut link, at_ms(0)), (29, 3));
+    for (when, count) in [(2, 4), (4, 5), (6, 6)] {
+        link.bytes(at_ms(when), &damaged());
+        let (happened, _) = events(&mut link, at_ms(when));
+        let [HostEvent::Damaged(_), HostEvent::Send(frame)] = happened.as_slice() else {
+            panic!("{when} ms: {happened:?}")
+        };
+        assert_eq!(frame[3..5], [29, count]);
+    }
+    link.bytes(at_ms(8), &reply(29, &[1, 2, 3, 4, 5, 6]));
+    assert_eq!(events(&mut link, at_ms(8)).0, [replied(id, 29, &[1, 2, 3])]);
+}
+
+#[test]
+fn a_damaged_frame_before_the_reply_is_due_is_another_one() {
+    let mut link = link(115_200);
+    let id = link.read(span(29, 3), PATIENCE);
+    assert_eq!(sent(&mut link, at_ms(0)), (29, 3));
+    link.bytes(at_ms(1), &damaged());
+    assert!(matches!(events(&mut link, at_ms(1)).0.as_slice(), [HostEvent::Damaged(_)]));
+    let (repeated, when) = next_after_silence(&mut link, at_ms(1));
+    assert!(matches!(repeated.as_slice(), [HostEvent::Send(_)]), "{repeated:?}");
+    assert!((100..105).contains(&(when.as_micros() / 1_000)), "{when:?}");
+    link.bytes(when, &reply(29, &[1, 2, 3]));
+    assert_eq!(events(&mut link, when).0, [replied(id, 29, &[1, 2, 3])], "a late reply is one");
+}
+
+#[test]
+fn a_damaged_frame_beside_the_reply_costs_a_needless_read_and_no_reply() {
+    let mut link = link(115_200);
+    let patience = Patience { attempts: 1, ..PATIENCE };
+    for (now, patience, repeats) in [(0, PATIENCE, 1), (50, patience, 0)] {
+        let id = link.read(span(29, 3), patience);
+        let (_, count) = sent(&mut link, at_ms(now));
+        link.bytes(at_ms(now + 2), &damaged());
+        let (happened, _) = events(&mut link, at_ms(now + 2));
+        assert_eq!(happened.len(), 1 + repeats, "a read with one attempt is not repeated: {happened:?}");
+        link.bytes(at_ms(now + 3), &reply(29, &vec![7; usize::from(count)]));
+        assert_eq!(events(&mut link, at_ms(now + 3)).0, [replied(id, 29, &[7; 3])]);
+    }
+}
+
+#[test]
+fn a_lost_reply_costs_little_on_a_line_that_is_in_time_and_several_are_no_error() {
     let mut link = link(115_200);
     for turn in 0..40 {
         link.read(span(29, 3), PATIENCE);

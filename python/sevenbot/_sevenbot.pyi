@@ -234,7 +234,7 @@ class Arm:
     def observe(self) -> Observation:
         """Positions, velocities and loads of one read, with its time and how old the measurement is: for a control loop.
 
-        A damaged answer is asked for again within some milliseconds. Raises `NotServed` with the maker's firmware. A servo that does
+        A damaged answer is asked for again at once. Raises `NotServed` with the maker's firmware. A servo that does
         not answer keeps its last position here: `status()` tells.
         """
     @property
