@@ -1,8 +1,10 @@
 //! Progress bars, and Ctrl-C, for calls of the library that take a while.
 
-use sevenbot::Arm;
-use sevenbot::moves::{JointMove, Observer, Stage};
+use sevenbot::fine::FineTargets;
+use sevenbot::moves::{JointMove, Observer, PaceBefore, Stage};
 use sevenbot::recording::{Moment, Recording};
+use sevenbot::register_text::joints;
+use sevenbot::{Arm, Speed};
 
 use crate::command_error::CommandError;
 use crate::interrupt::Interrupt;
@@ -47,6 +49,23 @@ pub(crate) fn note_rounding(begun: &JointMove) {
     if begun.is_rounded() {
         note(ROUNDING);
     }
+}
+
+/// Tells the user which joints will not move at the default speed, because a command left them another one: on purpose, or
+/// because it was killed before it could put the old speed back.
+pub(crate) fn note_other_pace(arm: &mut Arm, targets: &FineTargets) -> Result<(), CommandError> {
+    for (bits, pace) in PaceBefore::read(arm, targets)?.other_than_default() {
+        let speed = pace.speed.map_or(0.0, Speed::degrees_per_second);
+        let speed = match pace.time {
+            Some(time) => format!("{:.1} s for each move", time.duration().as_secs_f64()),
+            None => format!("{speed:.1} degrees/s"),
+        };
+        note(format_args!(
+            "{}: {speed}, as an earlier command left it; `sevenbot set speed 60` sets the default of 114 degrees/s",
+            joints(bits)
+        ));
+    }
+    Ok(())
 }
 
 /// As [`note_rounding`], before a recording is played.

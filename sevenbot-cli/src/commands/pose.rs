@@ -18,7 +18,7 @@ use crate::interrupt::{Interrupt, hold_on_interrupt};
 use crate::printer::{Printable, note, warn};
 use crate::session::Session;
 use crate::step_target::{out_of_range, step_target};
-use crate::watch::{ProgressWatch, note_rounding};
+use crate::watch::{ProgressWatch, note_other_pace, note_rounding};
 
 /// Move joints to a pose.
 #[derive(Debug, Args)]
@@ -42,7 +42,7 @@ refuses that, and its help describes the guard.
 With --wait the speeds and durations of the joints are put back after the move,
 also if it fails: then the command waits until the other joints have stopped.
 Without it they stay as this command sets them, because another speed would act
-at once; `sevenbot get speed` shows them.
+at once. A later move without --speed and --time keeps them, and a note says so.
 
 After Ctrl-C the arm holds its position.
 
@@ -186,6 +186,9 @@ fn move_to(session: &mut Session, goals: &[PoseArg], pace: &PaceArgs) -> Result<
     let reached = hold_on_interrupt(&mut arm, |arm, interrupt| {
         let targets = targets(goals, arm)?;
         pace.guard.warn_of_way(arm, &targets, pace.pace())?;
+        if pace.pace() == Pace::default() {
+            note_other_pace(arm, &targets)?;
+        }
         before = pace.is_for_this_move().then(|| PaceBefore::read(arm, &targets)).transpose()?;
         interrupt.check()?;
         let reached = go(arm, targets, pace, interrupt);
@@ -194,7 +197,9 @@ fn move_to(session: &mut Session, goals: &[PoseArg], pace: &PaceArgs) -> Result<
         }
         reached?.map(|whole| measured(arm, goals, whole)).transpose()
     });
-    put_back(&mut arm, before, reached.is_err())?;
+    if let Some(before) = before {
+        put_back(&mut arm, &before, &reached)?;
+    }
     match reached? {
         None => Ok(()),
         Some(ReachedPose::Degrees(positions_degrees)) => {
@@ -219,6 +224,9 @@ fn go(
 /// After a failure: waits until the other joints rest, because another speed would act on them at once. Ctrl-C ends the wait,
 /// and the arm then holds.
 fn wait_for_rest(arm: &mut Arm, before: &PaceBefore, error: &CommandError, interrupt: Interrupt) {
+    if Interrupt::is_requested() {
+        return;
+    }
     if let (Ok(moving @ 1..), Some(error)) = (before.moving(arm), error.message()) {
         note(format_args!(
             "{error}. Still moving: {}. This command waits for the end of that, and then puts the speeds back; Ctrl-C stops the arm",
@@ -230,9 +238,18 @@ fn wait_for_rest(arm: &mut Arm, before: &PaceBefore, error: &CommandError, inter
 }
 
 /// Puts the speeds and durations back. If the move has failed already, a failure here is only a warning.
-fn put_back(arm: &mut Arm, before: Option<PaceBefore>, has_failed: bool) -> Result<(), CommandError> {
-    match before.map_or(Ok(()), |before| before.put_back(arm)) {
-        Err(error) if has_failed => {
+fn put_back<T>(
+    arm: &mut Arm,
+    before: &PaceBefore,
+    reached: &Result<T, CommandError>,
+) -> Result<(), CommandError> {
+    let restored = match reached {
+        // The arm holds, though the duration of the move to its own place may still run.
+        Err(CommandError::Interrupted) => before.put_back_at_once(arm),
+        _ => before.put_back(arm),
+    };
+    match restored {
+        Err(error) if reached.is_err() => {
             warn(format_args!(
                 "the speeds and durations of the joints are still those of this command: {error}; `sevenbot get speed time` \
                  shows them, and `sevenbot set` changes them"

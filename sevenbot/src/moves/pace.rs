@@ -10,6 +10,7 @@ use crate::fine_state::FineTargets;
 use crate::joints::{frames_for, joints_of};
 use crate::units::{MoveTime, Speed};
 use host_link::{Snapshot, Span};
+use protocol_core::registers::Joint;
 use protocol_core::registers::map::{BLOCKED_JOINTS, MISSING_SERVOS, MOVING_JOINTS, SPEED, TIME};
 
 /// Time between two reads of an arm that comes to rest.
@@ -64,6 +65,30 @@ impl PaceBefore {
         Ok(Self { registers, joints: joints_of(targets) })
     }
 
+    /// The paces that a move without one would have, other than the default speed, each with its joints as
+    /// [`Joint::bit`](crate::Joint::bit)s.
+    #[must_use]
+    pub fn other_than_default(&self) -> Vec<(u8, Pace)> {
+        let (speeds, times) = (self.registers.joints(&SPEED), self.registers.joints(&TIME));
+        let by_default = Speed::from_steps(SPEED.default_at(SPEED.address));
+        let mut others: Vec<(u8, Pace)> = Vec::new();
+        for ((joint, speed), time) in Joint::ALL.into_iter().zip(speeds).zip(times) {
+            let speed = Speed::from_steps(speed);
+            if self.joints & joint.bit() == 0 || speed == by_default {
+                continue;
+            }
+            // A duration applies at the maximum speed only (D11).
+            let time = MoveTime::from_steps(time)
+                .filter(|time| speed == Some(Speed::MAXIMUM) && *time != MoveTime::NONE);
+            let pace = Pace { speed, time };
+            match others.iter_mut().find(|(_, other)| *other == pace) {
+                Some((joints, _)) => *joints |= joint.bit(),
+                None => others.push((joint.bit(), pace)),
+            }
+        }
+        others
+    }
+
     /// The joints of the move whose set-point still moves, as [`Joint::bit`](crate::Joint::bit)s. Blocked and silent joints do
     /// not count. 0 from firmware that does not tell.
     ///
@@ -114,8 +139,11 @@ impl PaceBefore {
         }
     }
 
-    /// As [`Self::put_back`], also while a joint moves.
-    pub(super) fn put_back_at_once(&self, arm: &mut Arm) -> Result<(), MoveError> {
+    /// As [`Self::put_back`], also while a joint moves: for an arm that was made to hold.
+    ///
+    /// # Errors
+    /// The registers do not take the values, or an exchange failed.
+    pub fn put_back_at_once(&self, arm: &mut Arm) -> Result<(), MoveError> {
         Ok(arm.put_back(&self.registers)?)
     }
 }

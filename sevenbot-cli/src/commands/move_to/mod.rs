@@ -15,7 +15,7 @@ use crate::interrupt::hold_on_interrupt;
 use crate::measured_pose::MeasuredPose;
 use crate::printer::note;
 use crate::session::Session;
-use crate::watch::{ProgressWatch, note_rounding};
+use crate::watch::{ProgressWatch, note_other_pace, note_rounding};
 
 mod args;
 mod facts;
@@ -89,6 +89,7 @@ fn move_to(
     hold_on_interrupt(arm, |arm, interrupt| {
         arm.driven_joints()?;
         args.guard.check_way(arm, &targets)?;
+        note_other_pace(arm, &targets)?;
         interrupt.check()?;
         let begun = JointMove::begin_fine(arm, targets)?;
         note_rounding(&begun);

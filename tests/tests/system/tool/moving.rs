@@ -4,7 +4,7 @@ use std::io::{BufRead, BufReader};
 use std::process::ChildStderr;
 use std::time::Duration;
 
-use super::output::{failed, succeeded, words};
+use super::output::{all_output, failed, succeeded, words};
 use system_tests::arm_control::ArmControl;
 use system_tests::process::{RunningProgram, Signal, send_signal};
 use system_tests::programs::tool;
@@ -18,9 +18,12 @@ use system_tests::{ArmClient, Need, TestArm, TestSetup, near, with_arm};
 /// A pose far from the standard one.
 const FAR: [&str; 7] = ["170", "90", "65", "90", "90", "90", "80"];
 
-/// Starts a slow move to a far pose, and waits until the arm moves.
-fn start_slow_move(arm: &mut TestArm) -> (RunningProgram, BufReader<ChildStderr>) {
-    let mut tool = arm.spawn_sevenbot(&[&["--verbose", "pose", "--wait", "--speed", "5"][..], &FAR].concat());
+/// A pace at which the way to the far pose takes some time.
+const SLOW: [&str; 2] = ["--speed", "5"];
+
+/// Starts a move to a far pose, and waits until the arm moves.
+fn start_slow_move(arm: &mut TestArm, pace: [&str; 2]) -> (RunningProgram, BufReader<ChildStderr>) {
+    let mut tool = arm.spawn_sevenbot(&[&["--verbose", "pose", "--wait"][..], &pace, &FAR].concat());
     let mut frames = BufReader::new(tool.stderr.take().expect("a pipe"));
     let (mut line, mut text) = (String::new(), String::new());
     while !line.contains("moving-joints = 1 ") {
@@ -168,23 +171,43 @@ fn zero_degrees_is_a_position() {
 #[test]
 fn ctrl_c_holds_the_position_of_the_arm() {
     with_arm(TestSetup::any(), |arm| {
-        let tool = start_slow_move(arm);
-        send_signal(&tool.0, Signal::INT);
-        let (text, status) = end(tool);
-        assert_eq!(status, Some(130), "{text}");
-        assert!(text.contains("the arm holds where it is"), "{text}");
-        arm.reopen(115_200);
-        let held = arm.register(TARGET_POSITION);
-        assert!(held < 165, "held at {held}");
-        arm.wait_until_still();
-        arm.wait_until("joint 1 is at rest", |arm| near(arm.register(PRESENT_POSITION), held));
+        for pace in [SLOW, ["--time", "8s"]] {
+            let tool = start_slow_move(arm, pace);
+            send_signal(&tool.0, Signal::INT);
+            let (text, status) = end(tool);
+            assert_eq!(status, Some(130), "{text}");
+            assert!(text.contains("the arm holds where it is"), "{text}");
+            assert!(!text.contains("warning") && !text.contains("waits"), "{text}");
+            arm.reopen(115_200);
+            let held = arm.register(TARGET_POSITION);
+            assert!(held < 165, "held at {held}");
+            assert_eq!((arm.read(SPEED, 7), arm.read(TIME, 7)), (vec![60; 7], vec![0; 7]), "put back");
+            arm.wait_until_still();
+            arm.wait_until("joint 1 is at rest", |arm| near(arm.register(PRESENT_POSITION), held));
+        }
+    });
+}
+
+#[test]
+fn a_speed_that_a_killed_command_left_is_told_by_the_next_move() {
+    with_arm(TestSetup::any(), |arm| {
+        let (mut tool, _) = start_slow_move(arm, SLOW);
+        tool.kill();
+        let text = all_output(&arm.sevenbot(&["pose", "91", "90", "65", "90", "90", "90", "80"]));
+        assert!(
+            text.contains("joints 1, 2, 3, 4, 5, 6 and 7: 9.5 degrees/s, as an earlier command left it"),
+            "{text}"
+        );
+        succeeded(arm.sevenbot(&["set", "speed", "60"]));
+        let text = all_output(&arm.sevenbot(&["home", "--wait"]));
+        assert!(!text.contains("earlier"), "{text}");
     });
 }
 
 #[test]
 fn a_lost_connection_ends_a_wait_with_an_error() {
     with_arm(TestSetup::any().needs(Need::Kill), |arm| {
-        let tool = start_slow_move(arm);
+        let tool = start_slow_move(arm, SLOW);
         arm.kill_and_restart();
         let (text, status) = end(tool);
         assert_eq!(status, Some(3), "{text}");
