@@ -7,7 +7,6 @@ use clap::{Args, value_parser};
 
 use super::monitor;
 use crate::command_error::CommandError;
-use crate::interrupt::Interrupt;
 use crate::printer::note;
 use crate::session::Session;
 
@@ -43,7 +42,6 @@ pub(crate) fn run(session: &mut Session, args: &LogArgs) -> Result<(), CommandEr
         return Err(CommandError::Usage("`log` writes its own FILE: leave --log out".to_owned()));
     }
     let mut arm = session.connect()?;
-    let interrupt = Interrupt::catch();
     let count = args.seconds.map_or(u64::MAX, |seconds| u64::from(seconds) * u64::from(args.hz));
     let mut written = 0;
     let ended = monitor::each_sample(&mut arm, monitor::period(args.hz), count, |_| {
@@ -53,11 +51,8 @@ pub(crate) fn run(session: &mut Session, args: &LogArgs) -> Result<(), CommandEr
             return Err(CommandError::file(&args.file, "the log has stopped growing: is the disk full?"));
         }
         written = length;
-        interrupt.check()
+        Ok(())
     });
     note(format_args!("{written} bytes in {}", args.file.display()));
-    match ended {
-        Err(CommandError::Interrupted) => Ok(()),
-        ended => ended,
-    }
+    ended
 }

@@ -29,6 +29,7 @@ use self::plot_kind::PlotKind;
 use self::sample::ArmSample;
 use crate::command_error::CommandError;
 use crate::guard_args::GuardArgs;
+use crate::interrupt::Interrupt;
 use crate::line_file::LineFile;
 use crate::output_file::{ForceArg, check_replaceable};
 use crate::printer::warn;
@@ -98,16 +99,20 @@ pub(super) fn period(hz: u8) -> Duration {
     Duration::from_secs(1) / u32::from(hz)
 }
 
-/// Takes `count` samples, one per period.
+/// Takes `count` samples, one per period, or fewer if Ctrl-C ends it.
 pub(super) fn each_sample(
     arm: &mut Arm,
     period: Duration,
     count: u64,
     mut take: impl FnMut(ArmSample) -> Result<(), CommandError>,
 ) -> Result<(), CommandError> {
+    Interrupt::catch();
     let start = Instant::now();
     let (mut due, mut told) = (start, Vec::new());
     for _ in 0..count {
+        if Interrupt::is_requested() {
+            return Ok(());
+        }
         sleep(due.saturating_duration_since(Instant::now()));
         // After a late sample the next period begins now, instead of catching up.
         due = (due + period).max(Instant::now());

@@ -2,7 +2,9 @@
 
 use super::output::{failed, succeeded};
 use std::fs;
+use std::io::{BufRead, BufReader};
 use std::path::Path;
+use system_tests::process::{Signal, send_signal};
 use system_tests::programs::sevenbot;
 use system_tests::registers::{MOTOR_STATE, STANDARD_POSE, TARGET_POSITION};
 use system_tests::started_arm::{ArmKind, StartedArm};
@@ -203,6 +205,19 @@ fn csv_is_complete_up_to_a_lost_connection() {
         assert_eq!((lines[0][0], lines[0].last()), ("seconds", Some(&"supply_lost")));
         assert!(lines.iter().all(|line| line.len() == lines[0].len()), "{text}");
         assert_eq!(lines[1][1..8], ["90", "90", "65", "90", "90", "90", "80"]);
+    });
+}
+
+#[test]
+fn ctrl_c_is_the_ordinary_end_of_lines() {
+    with_arm(TestSetup::any(), |arm| {
+        let mut tool = arm.spawn_sevenbot(&["monitor", "--json", "--hz", "50"]);
+        let mut lines = BufReader::new(tool.stdout.take().expect("a pipe")).lines();
+        lines.next().expect("a first line").expect("text");
+        send_signal(&tool, Signal::INT);
+        assert!(lines.all(|line| line.expect("text").ends_with('}')), "whole lines");
+        assert_eq!(tool.wait().expect("it ends").code(), Some(0));
+        arm.reopen(115_200);
     });
 }
 
