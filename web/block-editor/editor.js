@@ -8,7 +8,7 @@ var blockEditor = (() => {
   let workspace = null;
   let shown = null;
 
-  // The colours of style.css for users who prefer a dark page. Blocks have the same colours on both.
+  // The colours of the editor on a dark page, as in style.css. The blocks have the same colours on a light page.
   const prefersDark = matchMedia("(prefers-color-scheme: dark)");
   const dark = Blockly.Theme.defineTheme("arm-dark", {
     base: Blockly.Themes.Classic,
@@ -82,8 +82,8 @@ var blockEditor = (() => {
     return JSON.stringify(Blockly.serialization.workspaces.save(workspace));
   }
 
-  // Shows a program. Returns an empty text, or the error if the text is no program: then the last program stays. With `canUndo`,
-  // undo brings the last program back.
+  // Replaces the program, and returns an empty text. If the new text is no program, keeps the old program and returns the error.
+  // With `canUndo`, the user can undo the replacement.
   function load(program, canUndo) {
     const before = Blockly.serialization.workspaces.save(workspace);
     try {
@@ -134,7 +134,7 @@ var blockEditor = (() => {
     return btoa(String.fromCharCode(...bytes)).replaceAll("+", "-").replaceAll("/", "_").replaceAll("=", "");
   }
 
-  // Decodes what `pack` has made. Returns an empty text if the letters hold no program.
+  // Decodes the result of `pack`. Returns an empty text if the letters are not base64url or the bytes cannot be decompressed.
   async function unpack(letters) {
     try {
       const bytes = Uint8Array.from(atob(letters.replaceAll("-", "+").replaceAll("_", "/")), (letter) => letter.charCodeAt(0));

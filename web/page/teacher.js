@@ -68,13 +68,13 @@ const TEXTS = {
 };
 const BAD = ["no_arm", "stop_failed", "blocked", "problem"];
 const RETRY_MS = 1000;
-// After this many failed attempts, the class has more likely ended than the network is interrupted.
+// After this many failed attempts, assume that the class has ended: an interrupted network is less likely.
 const MOST_REFUSED = 5;
 // The server sends the state of the class at least twice a second. Silence for this long counts as a lost connection.
 const SILENCE_MS = 3000;
 
 const $ = id => document.getElementById(id);
-// Access to the storage throws if the browser blocks it. Then return null.
+// Runs `act`, which accesses the storage. Returns null if the browser blocks the storage: then the access throws.
 const stored = act => {
   try {
     return act();

@@ -20,13 +20,13 @@ const RESTING_VELOCITY: f32 = 1.0;
 /// An arm at one instant, joint 1 first.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ArmState {
-    /// The present positions in degrees, the last ones of silent joints; `None` for a joint not measured since power-up.
+    /// The present positions in degrees. A silent joint keeps its last one; `None` for a joint not measured since power-up.
     pub measured: [Option<f32>; 7],
     /// The target positions in degrees.
     pub targets: [f32; 7],
-    /// In degrees per second, positive towards greater angles. 0 from an arm without the extended block.
+    /// The velocities in degrees per second, positive towards greater angles. 0 from an arm without the extended block.
     pub velocities: [f32; 7],
-    /// In percent of the stall torque, positive towards greater angles. 0 from an arm without the extended block.
+    /// The loads in percent of the stall torque, positive towards greater angles. 0 from an arm without the extended block.
     pub loads: [f32; 7],
     /// Register 29: 0 damping, 1 servo, 2 forceless.
     pub motor_state: u8,
@@ -36,9 +36,9 @@ pub struct ArmState {
     pub missing: u8,
     /// Register 243: the joints whose set-point has not reached its target, bit n-1 for joint n.
     pub moving: u8,
-    /// The stalled joints, bit n-1 for joint n: those that the arm reports as blocked or let go, and those of joints 1 to 6 that
-    /// rest away from their target. Joint 7 may rest away from its target because it holds something. 0 if the motors are off, or
-    /// from an arm without the extended and status blocks.
+    /// The stalled joints, bit n-1 for joint n: the joints that the arm reports as blocked or let go, and those of joints 1 to 6
+    /// that rest away from their target. Joint 7 may rest away from its target because it holds something. 0 if the motors are
+    /// off, or from an arm that lacks the extended or the status block.
     pub stalled: u8,
     /// The problems that need attention, the most important first.
     pub problems: Vec<Problem>,
@@ -116,7 +116,7 @@ impl ArmState {
         angles
     }
 
-    /// The tip: x, y, z in mm; `None` if the servo of one of joints 1 to 6 does not answer.
+    /// The tip: x, y, z in mm; `None` if one of joints 1 to 6 was not measured or its servo does not answer.
     #[must_use]
     pub fn tip(&self) -> Option<[f64; 3]> {
         self.answered().iter().take(6).all(Option::is_some).then(|| tip(self.angles()))

@@ -1,4 +1,5 @@
-//! The protocol of a pupil's tab in a class: makes its messages and interprets those of the server, without the WebSocket.
+//! The protocol of a pupil's tab in a class: makes the messages of the tab, and interprets the messages of the server. This file
+//! does not know the WebSocket.
 //!
 //! ```text
 //!   ToPupil in JSON ──▶ Membership ──▶ ToPupil: what the page has to do

@@ -1,4 +1,4 @@
-//! The client of an arm: reads its registers in an endless series of rounds, and writes the commands of a person.
+//! The client of an arm: reads its registers in an endless series of rounds, and writes registers for the rest of the page.
 //!
 //! ```text
 //!   write, stop ──▶ ┌────────┐ ──▶ ┌──────────┐ ──▶ bytes to the arm
@@ -54,7 +54,6 @@ pub struct Client {
     read_since: Instant,
     /// The reads of this round that have neither a reply nor a timeout yet.
     awaited: Vec<RequestId>,
-    /// Was a reply of this round lost?
     is_round_lost: bool,
     rounds: u64,
     lost_rounds: u32,
@@ -82,7 +81,7 @@ impl Default for Client {
 }
 
 impl Client {
-    /// Does an arm answer?
+    /// True after the first complete round, until a reply was lost in each of three consecutive rounds.
     #[must_use]
     pub const fn is_connected(&self) -> bool {
         self.rounds > 0 && self.lost_rounds < LOST_ROUNDS
@@ -94,7 +93,8 @@ impl Client {
         self.rounds
     }
 
-    /// Were all registers read by requests that were queued after this write? Then they show its effect.
+    /// True if all registers were read by requests that were queued after this write, so that they show its effect. `write` is
+    /// the time that [`Self::write`] returned.
     #[must_use]
     pub fn was_read_since(&self, write: Instant) -> bool {
         self.rounds > 0 && self.read_since > write
@@ -144,7 +144,7 @@ impl Client {
         self.continue_stop(now);
     }
 
-    /// Makes every joint hold at its last known position, and sets these speeds. The arm does not confirm it, so that other
+    /// Makes every joint hold at its last known position, and sets these speeds. Does not wait for a confirmation, so that other
     /// targets can follow at once.
     pub fn hold(&mut self, now: Instant, speeds: [u8; 7]) {
         for (address, values) in hold_frames(&self.registers, speeds) {
@@ -214,7 +214,8 @@ impl Client {
         }
     }
 
-    /// Begins a new round of reads if the last one is over. Returns the bytes to send to the arm.
+    /// Repeats the frames of an unconfirmed stop, and begins a new round of reads if the last one is over. Returns the bytes to
+    /// send to the arm.
     pub fn poll(&mut self, now: Instant) -> Vec<u8> {
         self.advance(now);
         self.continue_stop(now);

@@ -1,4 +1,4 @@
-//! Writes that the arm has to confirm before a movement goes on.
+//! Writes that the arm has to confirm before a movement or a program goes on.
 
 use protocol_core::time::Instant;
 
@@ -26,8 +26,8 @@ impl Confirmed {
         Self { frames, written, attempts: 1 }
     }
 
-    /// Returns `Ok(true)` when the registers have the written values, and `Ok(false)` while it is not known yet. Writes them
-    /// again if they differ.
+    /// Returns `Ok(true)` when a later read has shown the written values, and `Ok(false)` before. If a read shows other values,
+    /// writes again, at most [`ATTEMPTS`] times in all.
     pub(crate) fn poll(&mut self, now: Instant, client: &mut Client) -> Result<bool, NotTaken> {
         if !client.was_read_since(self.written) {
             return Ok(false);

@@ -1,4 +1,5 @@
-//! Detects interruptions that end a movement although the arm has no fault: a stop by another program, and a pause of the page.
+//! Detects interruptions that end a park or a program although the arm has no fault: a stop by another program, and a pause of
+//! the page.
 //!
 //! A server counts the stops in its registers. Parks and programs decide when to check.
 
@@ -11,13 +12,13 @@ use sevenbot::Snapshot;
 use crate::movement::PlayFailure;
 use crate::stop::since_start;
 
-/// A longer pause of the page ends a movement: the arm has stopped meanwhile, and a person may rely on that.
+/// A longer pause of the page ends a park or a program: a person may rely on an arm that has stopped meanwhile.
 const LONGEST_PAUSE: Duration = Duration::from_secs(1);
-/// After a write, wait until this many rounds are complete: the reads of the current round may be older than the write, those of
-/// the next one are not.
+/// After a write, wait until this many rounds are complete: the reads of the current round may be older than the write, the
+/// reads of the next round are not.
 pub(crate) const ROUNDS_TO_KNOW: u64 = 2;
 
-/// Watches for interruptions of one movement.
+/// Watches for interruptions of one park or program.
 #[derive(Debug, Default)]
 pub(crate) struct Interruptions {
     last_poll: Option<Instant>,

@@ -9,7 +9,8 @@
 //!        └── commands ◀── events of a person
 //! ```
 //!
-//! Everything except `app`, the renderer and the sources that need a browser is plain Rust, and is tested on the host.
+//! Only `app`, the drawing code in `scene` and `plots`, and the sources `serial` and `socket` call the browser. Everything else
+//! is plain Rust, and is tested on the host.
 
 #![forbid(unsafe_code)]
 

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!   Player: open the stream ──▶ way to the first pose ──▶ the movement ──▶ close the stream ──▶ PlayProgress
-//!            └────────── each confirmed by a read, and written again until it is ──┘
+//!            └── both are written again until a read has confirmed them ───────────┘
 //! ```
 
 use std::time::Duration;
@@ -58,7 +58,7 @@ pub enum PlayProgress {
 pub enum PlayFailure {
     /// The arm reports a problem, is not driven, or does not answer.
     Arm(MoveFault),
-    /// The page did not run for this time, and the arm has stopped meanwhile.
+    /// The page did not run for this time, so that the arm may have stopped meanwhile.
     Paused(Duration),
     /// The arm does not take written registers.
     NotTaken,
@@ -74,8 +74,8 @@ impl From<NotTaken> for PlayFailure {
     }
 }
 
-/// Tells a server that a new movement or program begins, so that an earlier stop by another program does not end it. Writes
-/// nothing without a server.
+/// Tells a server that a new movement, park or program begins, so that an earlier stop by another program does not end it.
+/// Writes nothing without a server.
 pub(crate) fn start_anew(now: Instant, client: &mut Client) {
     if SharingState::of(client.registers()).is_some() {
         let (address, values) = Command::StartAnew.write();
@@ -108,7 +108,8 @@ pub struct Player {
     watch: MoveWatch,
     /// The round of the last registers that were checked.
     watched_round: u64,
-    /// A fault that a stop by another program may have caused: the arm may show its effect a round before the server reports it.
+    /// A fault that a stop by another program may have caused: the registers of the arm may show the effect of the stop one round
+    /// before the server reports the stop.
     suspected: Option<MoveFault>,
     stage: Stage,
 }
@@ -136,7 +137,7 @@ impl Player {
     /// As [`Self::new`], for a part of a program: also a stop by another program before the first point ends it.
     ///
     /// # Errors
-    /// As [`Self::new`].
+    /// A joint cannot follow the recording at its speed, or `rule` does not allow the distance to the first pose.
     pub(crate) fn along(
         recording: Recording,
         registers: &Snapshot,
@@ -305,7 +306,8 @@ impl Player {
         MovementRun::in_steps(way, now)
     }
 
-    /// The run of the movement. Its points determine the speed, so the speed registers are set to the maximum.
+    /// Creates the run of the movement. With the extended block, its points determine the speed, so this also sets the speed
+    /// registers to the maximum.
     fn path(&self, now: Instant, client: &mut Client) -> MovementRun {
         if !self.is_fine {
             return MovementRun::in_steps(playback::steps(&self.recording, 1.0), since_start(now));

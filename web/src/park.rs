@@ -2,10 +2,11 @@
 //!
 //! ```text
 //!   Park: two rounds of reads ──▶ the way, pose by pose ──▶ let go ──▶ ParkProgress
-//!             └── motors off, a problem, a stop or a pause: ParkFailure, and the arm holds ──┘
+//!             └── motors off, a problem, a stop or a pause: ParkFailure ─────┘
 //! ```
 //!
-//! The path, its speed and the time to check are the same as for `sevenbot park`.
+//! The path, its speed and the time to check are the same as for `sevenbot park`. A failure on the way stops the arm. After a
+//! failure in the last stage, `holds_again` decides whether the motors drive the arm again.
 
 use protocol_core::time::{Duration, Instant};
 use sevenbot::fine::FineTargets;
@@ -49,7 +50,7 @@ pub enum ParkFailure {
     NotMeasured,
     /// The arm sank after it was let go. Its motors drive it again.
     Sank,
-    /// The arm did not reach the pose.
+    /// The arm did not reach the pose, or had a fault while it was watched in the pose.
     Move(PlayFailure),
 }
 
@@ -70,7 +71,8 @@ enum Stage {
     Start,
     /// Waits until this round of reads is complete.
     Beginning(u64),
-    /// The remaining parts of the path, the current one last, and the time and round of reads at which it was sent.
+    /// The remaining parts of the path, the current one last; and the time and round of reads at which the current part was sent,
+    /// `None` before.
     Way(Vec<FineTargets>, Option<(Instant, u64)>),
     /// The angles in degrees and the time at which the arm was let go, and the round of reads that shows it.
     LetGo([f32; 7], Instant, u64),
@@ -213,7 +215,7 @@ fn way(state: &ArmState) -> Result<Vec<FineTargets>, ParkFailure> {
     Ok(way)
 }
 
-/// `is_known`: the registers are newer than the write that let the arm go.
+/// Fails if the arm sinks or its motors leave damping. `is_known`: the registers are newer than the write that let the arm go.
 fn watch_parked(
     now: Instant,
     state: &ArmState,
@@ -231,7 +233,8 @@ fn watch_parked(
     Ok(if now >= since + WATCH_TIME { ParkProgress::Parked } else { ParkProgress::Moving })
 }
 
-/// Do the motors drive an arm again that was let go? Not after a failure of the whole arm, such as a lost supply.
+/// True if the motors have to drive the arm again after this failure, because it was let go already. False after a failure of
+/// the whole arm, such as a lost supply.
 fn holds_again(failure: &ParkFailure) -> bool {
     match failure {
         ParkFailure::Sank | ParkFailure::Move(PlayFailure::Paused(_)) => true,

@@ -24,7 +24,8 @@ const MOST_STEPS: u32 = 15_000;
 const STEPS_TO_START: u32 = 100;
 /// After three more seconds it has reached any pose.
 const STEPS_TO_POSE: u32 = 150;
-/// The largest distance of joints 1 to 6 from that pose, in degrees: servos have play. Joint 7 may hold something.
+/// A new arm has reached its pose if joints 1 to 6 are at most this far from it, in degrees: servos have play. Joint 7 may hold
+/// something.
 const NEAR: f32 = 3.0;
 
 /// The end of a preview.

@@ -48,12 +48,12 @@ pub enum ProgramProgress {
     Failed(ProgramFailure),
 }
 
-/// Does the program stop before each block?
+/// How the program goes from one block to the next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pace {
-    /// No: it runs without a pause.
+    /// It runs without a pause.
     Running,
-    /// Yes: it waits for [`ProgramRun::go_on`] before each block.
+    /// It waits for [`ProgramRun::go_on`] before each block.
     SingleSteps,
 }
 
@@ -62,7 +62,7 @@ pub enum Pace {
 pub struct ProgramRun {
     interpreter: Interpreter,
     pace: Pace,
-    /// It waits before a block for [`Self::go_on`].
+    /// True while the program waits before a block for [`Self::go_on`].
     is_waiting: bool,
     /// The current block; `None` before the first one.
     block: Option<BlockId>,

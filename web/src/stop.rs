@@ -81,7 +81,8 @@ impl Stop {
     }
 }
 
-/// The frames that make the joints hold without a confirmation, and then set these speeds: only the speeds if the motors are off.
+/// The frames that make the joints hold without a confirmation, and then set these speeds. If the motors are off, the frames only
+/// set the speeds.
 pub(crate) fn hold_frames(registers: &Snapshot, speeds: [u8; 7]) -> Frames {
     let frames = match Hold::at_once(Some(&HeldJoints::of(registers))).poll(Duration::ZERO) {
         HoldStep::Write(frames) => frames,

@@ -1,4 +1,5 @@
-//! Every text of the page, in English and Chinese. The English texts for problems and their remedies come from the library.
+//! The texts of the page, in English and Chinese. The texts for problems and their remedies come from the library in English,
+//! and from `problems_in_chinese.rs` in Chinese.
 
 use sevenbot::Problem;
 

@@ -15,14 +15,14 @@ use crate::texts::Language;
 /// At most this many problems are shown at the same time, because the line is short.
 const PROBLEMS_SHOWN: usize = 2;
 
-/// The colour of the line: is its message good, bad or neutral?
+/// The kind of the line's message, which determines the colour of the line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mood {
     /// All is well.
     Good,
     /// A person has to act.
     Bad,
-    /// Neutral: nothing is wrong, but the arm is not ready.
+    /// Neutral: nothing is wrong, but the arm is not ready, for example because it moves.
     Plain,
 }
 
@@ -38,7 +38,7 @@ impl Mood {
     }
 }
 
-/// Does an arm answer?
+/// Whether the arm answers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Answers {
     /// It has not answered yet.
@@ -74,7 +74,7 @@ pub fn state_line(
         _ => {}
     }
     let stalled = || format!("{} {}", language.text("stalled"), joints(state.stalled));
-    // A joint that rests away from its target is more precise than a fault bit without a joint.
+    // A stalled joint tells more than a fault bit that names no joint.
     match state.problems.first() {
         Some(problem) if problem.kind < ProblemKind::ServoBus || state.stalled == 0 => {
             let texts = state.problems.iter().take(PROBLEMS_SHOWN).map(|&problem| language.problem(problem));
@@ -232,7 +232,7 @@ fn move_fault(language: Language, fault: &MoveFault) -> String {
     }
 }
 
-/// The numbers of the joints whose bits are set as a list, bit n-1 for joint n.
+/// The numbers of the joints whose bits are set (bit n-1 for joint n), as a list.
 fn joints(bits: u8) -> String {
     let numbers = (1..=7).filter(|number| bits >> (number - 1) & 1 == 1);
     numbers.map(|number| number.to_string()).collect::<Vec<_>>().join(", ")

@@ -22,14 +22,14 @@ pub(crate) enum Step {
     Pop,
     Jump(usize),
     JumpIfFalse(usize),
-    /// Jumps if the value on top has this truth, and keeps the value. If not, drops the value.
+    /// If the value on top has this truth, keeps the value and jumps. If not, drops the value.
     JumpKeepingIf {
         truth: bool,
         to: usize,
     },
     /// Rounds the number of iterations towards zero; a negative number becomes 0.
     Count,
-    /// Decrements the number of remaining iterations. If it is 0, drops it and jumps.
+    /// If the number of remaining iterations is 0, drops the number and jumps. If not, decrements it.
     NextRound(usize),
     Sense(Sensor),
     Act(Act),
@@ -39,7 +39,6 @@ pub(crate) enum Step {
     },
     /// Returns from a function, with the value on top as its result.
     Return,
-    /// Ends the program.
     End,
 }
 

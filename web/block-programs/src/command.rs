@@ -27,7 +27,7 @@ pub enum Command {
         /// The speed, or the duration.
         pace: Pace,
     },
-    /// The tip goes to a point, on any path: each joint moves at its own speed.
+    /// The tip goes to a point. The joints move independently of each other, so the path of the tip is not straight.
     Tip {
         /// The point, in millimetres.
         tip: Vector,
@@ -50,7 +50,7 @@ pub enum Command {
         /// The target of joint 7.
         claw: FineAngle,
     },
-    /// Switches the pump on or off.
+    /// Switches the vacuum pump: true is on.
     Vacuum(bool),
     /// The program waits for this time.
     Wait(Duration),
@@ -82,7 +82,7 @@ pub enum Axis {
     Z,
 }
 
-/// The direction of the tool.
+/// The direction in which the tool points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Tool {
     Down,

@@ -8,7 +8,6 @@ use crate::value::Value;
 /// The result of a function that returns no value.
 const NO_RESULT: Value = Value::Number(0.0);
 
-/// Compiles a program.
 pub(crate) fn compile(program: &Program) -> Code {
     let mut compiler = Compiler::default();
     compiler.statements(&program.body);
@@ -26,7 +25,7 @@ struct Compiler {
 /// A loop whose body is being compiled.
 struct Loop {
     head: usize,
-    /// The number of its remaining iterations is on the stack, and has to be dropped on a break.
+    /// True if the number of remaining iterations is on the stack: a break has to drop this number.
     is_counted: bool,
     /// The instructions that jump to the end of the loop, which is not known yet.
     exits: Vec<usize>,

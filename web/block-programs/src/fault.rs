@@ -1,4 +1,4 @@
-//! The errors of a program: those of parsing, and those that end it while it runs.
+//! The errors of a program: faults that the parser finds, and faults that end the program while it runs.
 
 use std::fmt;
 use std::rc::Rc;

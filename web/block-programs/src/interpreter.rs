@@ -52,7 +52,7 @@ pub struct Interpreter {
 struct OpenCall {
     /// The index of the instruction after the call.
     back: usize,
-    /// The index of its first argument on the stack.
+    /// The index of the first argument on the stack.
     base: usize,
 }
 

@@ -117,7 +117,7 @@ impl<'a> Block<'a> {
         self.disabled_reasons.is_empty() && self.enabled != Some(false)
     }
 
-    /// The enabled block in an input; `None` if the input is empty.
+    /// The block in an input; `None` if the input is empty or its block is disabled.
     pub(crate) fn input(&self, name: &str) -> Result<Option<Block<'a>>, ProgramError> {
         let block = self.inputs.get(name).map(Connection::block).transpose()?.flatten();
         Ok(block.filter(Block::is_enabled))
@@ -144,7 +144,7 @@ impl<'a> Block<'a> {
         id.ok_or_else(|| self.bad_field(field))
     }
 
-    /// The choice that a field selects by its name.
+    /// Looks up the name that a field holds, and returns the choice of this name.
     pub(crate) fn choice<T: Copy>(&self, field: &str, choices: &[(&str, T)]) -> Result<T, ProgramError> {
         let name = self.text(field)?;
         let found = choices.iter().find(|(known, _)| *known == name);

@@ -18,7 +18,7 @@ impl Names {
         Self(TAKEN.iter().map(|&word| word.to_owned()).collect())
     }
 
-    /// Takes a free Python name for this name. If the name is taken, adds a number from 2 on.
+    /// Returns a free Python name that resembles `name`, and reserves it. Appends `_2`, `_3` and so on to names that are taken.
     pub(crate) fn give(&mut self, name: &str) -> String {
         let like = identifier(name);
         let others = (2..).map(|number| format!("{like}_{number}"));
@@ -29,7 +29,8 @@ impl Names {
     }
 }
 
-/// Replaces characters that a Python name cannot have by `_`. ASCII letters, digits and Chinese characters stay.
+/// Replaces each character by `_`, except ASCII letters, digits and Chinese characters. A name that is empty or begins with a
+/// digit gets `_` in front.
 fn identifier(name: &str) -> String {
     let is_plain =
         |letter: &char| letter.is_ascii_alphanumeric() || ('\u{4e00}'..='\u{9fff}').contains(letter);

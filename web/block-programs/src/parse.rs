@@ -53,7 +53,7 @@ impl Program {
     }
 }
 
-/// Parses a workspace. Ignores blocks that are neither below the start block nor part of a function.
+/// Parses a workspace. Ignores disabled blocks, and blocks that are neither below the start block nor part of a function.
 fn program(text: &str) -> Result<Program, ProgramError> {
     let workspace = Workspace::of(text)?;
     let blocks: Vec<_> = workspace.top_blocks()?.into_iter().filter(Block::is_enabled).collect();

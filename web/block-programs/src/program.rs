@@ -76,7 +76,7 @@ pub(crate) enum StatementKind {
         function: usize,
         arguments: Vec<Expression>,
     },
-    /// Returns from the function if the first expression is true. The second one is the result; `None` if there is none.
+    /// Returns from the function if the first expression is true. The second one is the result; `None` if the function has none.
     Return(Expression, Option<Expression>),
 }
 

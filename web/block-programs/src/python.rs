@@ -25,7 +25,8 @@ mod binding {
     pub(super) const WHOLE: u8 = 9;
 }
 
-/// Writes a program as Python. Its argument is the name of a port. Without one, it uses the only connected arm.
+/// Writes a program as Python. The Python program takes the name of a port as its argument. Without an argument, it uses the
+/// only connected arm.
 ///
 /// ```
 /// let workspace = r#"{"blocks": {"blocks": [{"type": "arm_start", "id": "a", "next": {"block":
@@ -139,7 +140,7 @@ impl Writer<'_> {
         }
     }
 
-    /// A statement that needs only one line.
+    /// The text of a statement that needs only one line.
     fn simple(&self, kind: &StatementKind) -> String {
         match kind {
             StatementKind::MoveJoint { joint, angle, speed } => {
@@ -192,12 +193,12 @@ impl Writer<'_> {
         number.and_then(|number| self.globals.get(number)).map_or("", String::as_str)
     }
 
-    /// An expression that needs no brackets around it.
+    /// The text of an expression at a place where no expression needs brackets.
     fn plain(&self, expression: &Expression) -> String {
         self.expression(expression).0
     }
 
-    /// An expression beside an operator, in brackets if its precedence is below `least`.
+    /// The text of an operand, in brackets if its precedence is below `least`.
     fn bound(&self, expression: &Expression, least: u8) -> String {
         let (text, binding) = self.expression(expression);
         if binding >= least { text } else { format!("({text})") }
@@ -270,7 +271,7 @@ const fn compared(comparison: Comparison) -> &'static str {
     }
 }
 
-/// The operator, its precedence, and the lowest precedence of its left and right operand without brackets.
+/// The operator, its precedence, and the lowest precedences at which its left and right operand need no brackets.
 const fn calculated(operation: Arithmetic) -> (&'static str, u8, [u8; 2]) {
     use binding::{POWER, PRODUCT, SIGN, SUM, WHOLE};
     match operation {

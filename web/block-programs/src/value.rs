@@ -64,7 +64,7 @@ impl Value {
     }
 }
 
-/// The remainder as in Python: its sign is that of the divisor.
+/// The remainder as in Python: it has the sign of the divisor.
 fn remainder(one: f64, other: f64) -> f64 {
     let rest = one % other;
     if rest != 0.0 && (rest < 0.0) != (other < 0.0) { rest + other } else { rest }

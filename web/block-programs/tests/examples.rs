@@ -1,4 +1,5 @@
-//! Checks the table of blocks, and that the examples in `examples/`, which other tests run, use every block.
+//! Checks that the table of blocks has its texts in both languages, and that the programs in `examples/` use every block. Other
+//! tests run these programs.
 
 #![allow(clippy::expect_used, clippy::indexing_slicing)] // A panic is a failed test.
 
@@ -32,7 +33,7 @@ fn kinds_in(path: &Path) -> BTreeSet<String> {
     found
 }
 
-/// The blocks that Blockly itself adds to the toolbox, for variables and functions.
+/// Blocks that Blockly itself adds to the toolbox, for variables and functions.
 const OFFERED_BY_BLOCKLY: [&str; 7] = [
     "variables_get",
     "variables_set",

@@ -1,4 +1,4 @@
-//! Debian's Chromium, with software rendering and no way to other computers.
+//! Debian's Chromium, with software rendering and without connections to other computers.
 
 use std::process::{Child, Command, Stdio};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -42,7 +42,7 @@ const OPTIONS: &[&str] = &[
     "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1",
 ];
 
-/// Events of these methods are kept. A served arm sends a thousand others.
+/// Only events of these methods are kept. The page of a served arm causes many others.
 const KEPT: [&str; 5] = [
     "Network.requestWillBeSent",
     "Network.webSocketCreated",
@@ -51,7 +51,8 @@ const KEPT: [&str; 5] = [
     "Log.entryAdded",
 ];
 
-/// Starts the browser with a new profile, and ends it when the standard input ends: with the process of the tests, however that ends.
+/// Starts the browser with a new profile, and ends it when the standard input is closed. The input is closed at the latest when
+/// the process of the tests ends, also if it is killed.
 const RUN: &str = r#"
     profile=$(mktemp -d)
     chromium --user-data-dir="$profile" "$@" &
@@ -64,10 +65,9 @@ const RUN: &str = r#"
 /// a time has it.
 static BROWSER: Mutex<Option<Chromium>> = Mutex::new(None);
 
-/// A running browser.
 #[derive(Debug)]
 struct Chromium {
-    /// Where its DevTools listen, without `ws://`.
+    /// The address of its DevTools, without `ws://`.
     address: String,
     /// The shell, with its standard input.
     _process: Child,
@@ -95,7 +95,7 @@ pub struct BrowserContext {
 }
 
 impl BrowserContext {
-    /// Waits until no other test has the browser.
+    /// Waits until no other test has the browser, starts the browser if it does not run yet, and creates a context.
     #[must_use]
     pub fn open() -> Self {
         let mut turn = BROWSER.lock().unwrap_or_else(PoisonError::into_inner);

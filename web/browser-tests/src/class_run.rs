@@ -22,7 +22,7 @@ pub struct ClassRun {
 }
 
 impl ClassRun {
-    /// A class whose code is `robots7`.
+    /// Starts a class whose code is `robots7`. With `has_arm`, a simulated arm takes the place of the class's real arm.
     #[must_use]
     pub fn start(has_arm: bool) -> Self {
         let folder = tempfile::tempdir().expect("a temporary folder");
@@ -38,13 +38,13 @@ impl ClassRun {
         Self { _server: server, _simulator: simulator, pupils, teacher, folder }
     }
 
-    /// Opens the teacher's screen in a browser of its own.
+    /// Opens the teacher's screen in a new browser context.
     #[must_use]
     pub fn open_teacher(&self) -> Page {
         Page::open(&self.teacher)
     }
 
-    /// Opens a pupil's page in the browser of another page, and types a name and the code.
+    /// Opens a pupil's page in the browser context of another page, and joins the class with this name.
     #[must_use]
     pub fn join(&self, beside: &Page, name: &str) -> Page {
         self.join_after(beside, name, "")

@@ -20,7 +20,7 @@ pub struct Connection {
     /// For the delays of `LATE_TEST`.
     random: Xoshiro256PlusPlus,
     last_id: u64,
-    /// The session of the DevTools protocol that calls belong to, once there is one.
+    /// The session of the DevTools protocol that calls belong to; `None` for calls to the browser itself.
     pub session: Option<String>,
     /// The events that are kept, in order.
     pub events: Vec<Value>,
@@ -75,7 +75,7 @@ impl Connection {
     }
 }
 
-/// A number in the environment; 0 without one.
+/// The number in an environment variable; 0 if the variable is not set or holds no number.
 pub(crate) fn variable(name: &str) -> u64 {
     std::env::var(name).ok().and_then(|number| number.parse().ok()).unwrap_or(0)
 }

@@ -62,7 +62,7 @@ impl Firefox {
         Self { _browser: browser, _screen: screen, _profile: profile, session, context }
     }
 
-    /// The value of a JavaScript expression, which may wait.
+    /// The value of a JavaScript expression. Waits if the expression is a promise.
     #[track_caller]
     pub fn evaluate(&mut self, expression: &str) -> Value {
         let parameters = json!({

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use crate::page::Page;
 use system_tests::wait::wait_until;
 
-/// How many events a drag has between its ends.
+/// The number of move events of a drag.
 const DRAG_STEPS: u32 = 20;
 
 /// The positions of the events of a drag, after its start.
@@ -19,7 +19,7 @@ fn way(from: [f64; 2], to: [f64; 2]) -> impl Iterator<Item = [f64; 2]> {
 }
 
 impl Page {
-    /// The centre of an element in CSS pixels, scrolled into view.
+    /// Scrolls an element into view. Returns its centre in CSS pixels.
     #[track_caller]
     pub fn centre(&mut self, selector: &str) -> [f64; 2] {
         let script = format!(
@@ -134,7 +134,7 @@ impl Page {
         ));
     }
 
-    /// Moves all sliders at once, as a person would one after the other.
+    /// Moves all sliders, with the events that a person would cause, but without a pause between them.
     #[track_caller]
     pub fn slide_all(&mut self, degrees: [u32; 7]) {
         self.evaluate(&format!(
@@ -143,7 +143,7 @@ impl Page {
         ));
     }
 
-    /// Writes a register in the table of the page.
+    /// Writes a register in the table of the page. Opens the panel of the table for this, if it is closed.
     #[track_caller]
     pub fn write_register(&mut self, address: u8, value: &str) {
         let panel = "document.querySelector('#registers-panel').open";
@@ -158,7 +158,7 @@ impl Page {
         self.evaluate(&format!("{panel} = {was_open}"));
     }
 
-    /// Lets downloads go to a folder.
+    /// Stores the downloads of this browser context in a folder.
     pub fn download_to(&mut self, folder: &Path) {
         let behaviour =
             json!({ "behavior": "allow", "downloadPath": folder, "browserContextId": self.browser.id });

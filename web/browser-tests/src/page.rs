@@ -1,4 +1,4 @@
-//! A page in the browser: its values, its pictures, its faults and what it requested.
+//! A page in the browser: its values, its pictures, its errors and its requests.
 
 use std::rc::Rc;
 
@@ -13,7 +13,7 @@ use crate::picture::Picture;
 
 /// The register that tells which joints have a moving set-point.
 const MOVING_JOINTS: usize = sevenbot::map::MOVING_JOINTS.address as usize;
-/// Keeps each text that these elements show. A test may be too late to see one that stays for seconds only.
+/// A script that keeps each text that these elements show, because a test may be too late for a text that is soon replaced.
 const KEEP_TEXTS: &str = "
     window.said = [];
     (() => {
@@ -129,10 +129,10 @@ impl Page {
         self.connection.call(method, parameters)
     }
 
-    /// The value of a JavaScript expression, which may wait.
+    /// The value of a JavaScript expression. Waits if the expression is a promise.
     ///
     /// # Errors
-    /// The exception, or the answer of a browser that left the page meanwhile.
+    /// The expression throws an exception, or the browser reports an error, for example because it left the page meanwhile.
     pub fn try_evaluate(&mut self, expression: &str) -> Result<Value, String> {
         let parameters = json!({
             "expression": format!("(async () => ({expression}))()"),
@@ -172,7 +172,7 @@ impl Page {
         self.evaluate(&format!("document.querySelector(`{selector}`).focus()"));
     }
 
-    /// What the page knows of the arm.
+    /// The state of the page: the JSON that the page's module exports.
     #[track_caller]
     pub fn state(&mut self) -> Value {
         let text = self.evaluate("window.sevenbot.state()");
@@ -189,14 +189,15 @@ impl Page {
         })
     }
 
-    /// Waits until the arm that the page has now answers, and nothing is wrong with it.
+    /// Waits until the present arm of the page answers and is ready.
     #[track_caller]
     pub fn wait_until_ready(&mut self) {
         self.wait_for_state("the arm answers", |state| state["connected"] == true);
         self.wait_for_text("#state", "The arm is ready.");
     }
 
-    /// Waits until an element has shown a text, after the text that the last call waited for. The text may be gone again.
+    /// Waits until an element has shown a text that contains `part`, later than the text that the last call waited for. The text
+    /// may be gone again.
     #[track_caller]
     pub fn wait_until_said(&mut self, selector: &str, part: &str) {
         self.heard = wait_for(&format!("{selector} has said {part}"), || {
@@ -230,7 +231,7 @@ impl Page {
         self.pass(0.5);
     }
 
-    /// Waits until an element has a text.
+    /// Waits until the text of an element contains `part`.
     #[track_caller]
     pub fn wait_for_text(&mut self, selector: &str, part: &str) {
         wait_for(&format!("{selector} says {part}"), || {
@@ -259,7 +260,7 @@ impl Page {
         self.state()["targets"][joint - 1].as_f64().expect("an angle")
     }
 
-    /// Where a point in mm is drawn, in CSS pixels from the top left of the window.
+    /// Projects a point in mm to CSS pixels from the top left of the window.
     #[track_caller]
     pub fn project(&mut self, [x, y, z]: [f64; 3]) -> [f64; 2] {
         let place = self.evaluate(&format!("[...window.sevenbot.project({x}, {y}, {z})]"));

@@ -1,4 +1,4 @@
-//! Pictures of the page: PNG to pixels, and back to files, still or moving.
+//! Pictures of the page: decodes PNG files, counts pixels, and writes animations.
 
 use std::fs;
 use std::io::{BufWriter, Cursor};

@@ -21,19 +21,19 @@ pub struct Viewed {
 }
 
 impl Viewed {
-    /// Without an arm: the page simulates one.
+    /// Starts the server without an arm: the page simulates one.
     #[must_use]
     pub fn without_arm() -> Self {
         Self::start(false, &[])
     }
 
-    /// With an arm of `host-sim`.
+    /// Starts the server with an arm of `host-sim`.
     #[must_use]
     pub fn with_arm() -> Self {
         Self::start(true, &[])
     }
 
-    /// With an arm of `host-sim` that the page cannot move.
+    /// Starts the server with an arm of `host-sim` that the page cannot move.
     #[must_use]
     pub fn read_only() -> Self {
         Self::start(true, &["--read-only"])
@@ -77,7 +77,7 @@ impl Viewed {
         self.folder.path().join(name)
     }
 
-    /// The program `sevenbot`, where the arm is `./arm`.
+    /// A command that runs `sevenbot` in the folder of this server, where `./arm` is the port of the arm.
     #[must_use]
     pub fn tool(&self) -> Command {
         let mut command = tool();

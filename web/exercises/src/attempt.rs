@@ -7,7 +7,7 @@ use crate::path::{PathProgress, distance};
 /// A goal for a joint or a thing is reached after the joint or thing has been in place for this long, in seconds.
 const AT_REST: f64 = 0.5;
 
-/// What was measured at one instant, in the arm and on the table.
+/// The state of the arm and of the things on the table at one instant.
 #[derive(Clone, Debug, Default)]
 pub struct Observation {
     /// The time in seconds, from any fixed instant.
@@ -42,7 +42,7 @@ enum Progress {
     There(f64),
 }
 
-/// An attempt at an exercise.
+/// The goals of an exercise, and which of them the learner has reached.
 ///
 /// ```
 /// use exercises::{Attempt, Exercise, Observation};
@@ -73,7 +73,8 @@ impl Attempt {
         Self { goals, in_order: exercise.in_order, seconds: None }
     }
 
-    /// Takes an observation. Returns true if it reaches a goal. After the exercise is solved it has no effect.
+    /// Checks the open goals against an observation. Returns true if at least one of them is reached now. Has no effect after the
+    /// exercise is solved.
     pub fn observe(&mut self, seen: &Observation) -> bool {
         if self.is_solved() {
             return false;
@@ -133,7 +134,8 @@ fn is_reached(goal: &Goal, progress: &mut Progress, seen: &Observation) -> bool 
     }
 }
 
-/// Has a joint or thing been in place for at least [`AT_REST`]?
+/// Updates the progress of a goal for a joint or a thing. Returns true if the joint or thing has been in place for at least
+/// [`AT_REST`].
 fn rests(progress: &mut Progress, seconds: f64, is_there: bool) -> bool {
     if !is_there {
         *progress = Progress::Open;

@@ -9,7 +9,7 @@ use crate::text::Text;
 /// The largest file of an exercise, in bytes.
 const LARGEST: usize = 200_000;
 
-/// An exercise.
+/// A task for a learner, with goals that a program can check.
 ///
 /// ```
 /// use exercises::Exercise;
@@ -26,7 +26,7 @@ pub struct Exercise {
     pub title: Text,
     /// The task, for the learner.
     pub text: Text,
-    /// Shown one after the other, when the learner asks for a hint.
+    /// The hints, in the order in which the learner sees them: one more at each request.
     #[serde(default)]
     pub hints: Vec<Text>,
     /// The goals. An exercise has at least one.
@@ -34,7 +34,7 @@ pub struct Exercise {
     /// Must the goals be reached in their order?
     #[serde(default)]
     pub in_order: bool,
-    /// Actions on the simulated arm at the start, such as `fault 1=wall=120`. A real arm cannot do an exercise that has some.
+    /// Actions on the simulated arm at the start, such as `fault 1=wall=120`. An exercise with actions needs a simulated arm.
     #[serde(default)]
     pub setup: Vec<String>,
     /// The steps of a solution; empty if the file has none.
@@ -66,7 +66,8 @@ impl Exercise {
     /// Parses the file of an exercise.
     ///
     /// # Errors
-    /// The text is longer than 200,000 bytes or no JSON, a member is missing or unknown, or a goal can never be reached.
+    /// The text is longer than 200,000 bytes or no JSON, a member is missing or unknown, there is no goal, or a number of a goal
+    /// is out of its range.
     pub fn parse(text: &str) -> Result<Self, ExerciseError> {
         let whole = |reason: &str| ExerciseError { line: 0, reason: reason.to_owned() };
         if text.len() > LARGEST {

@@ -122,7 +122,7 @@ impl Goal {
         }
     }
 
-    /// The reason why the goal can never be reached, in English; `None` if it can be reached.
+    /// The reason why a number of the goal is invalid, in English; `None` if all numbers are valid.
     pub(crate) fn fault(&self) -> Option<&'static str> {
         let (within, is_possible, fault) = match self {
             Self::Tip { within, .. } | Self::Thing { within, .. } => (*within, true, ""),

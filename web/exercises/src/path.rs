@@ -2,8 +2,8 @@
 
 /// The largest number of points of a path.
 pub(crate) const MOST_POINTS: usize = 100;
-/// The largest distance of neighbouring checkpoints on the path, and of the positions that are interpolated between two
-/// observations of the tip, in mm.
+/// The largest distance in mm between neighbouring checkpoints of a path, and between neighbouring positions that are
+/// interpolated from one observation of the tip to the next.
 const STEP: f64 = 2.0;
 /// The largest number of steps between two observations, which makes 100 mm. After a longer distance the path between the two
 /// observations is unknown, and the tip begins again.
@@ -30,7 +30,8 @@ impl PathProgress {
         Self { checkpoints, within, passed: 0, last: None }
     }
 
-    /// Takes the position of the tip; `None` begins the path again, because it is not measured. Returns true at the end.
+    /// Takes the position of the tip. If it is not measured (`None`), the tip has to begin the path again. Returns true at the
+    /// end of the path.
     pub(crate) fn observe(&mut self, tip: Option<Point>) -> bool {
         let Some(tip) = tip else {
             self.passed = 0;

@@ -26,7 +26,8 @@ const LOOK_MS: i32 = 1_000;
 const QUERY: &str = "?class";
 
 impl App {
-    /// Opens the panel of the class if the page's address leads to one. Joins at once if this tab was in the class before.
+    /// If the page's address is the address of a class: opens the panel of the class, starts the timer that checks the
+    /// connection, and joins at once if this tab was in the class before.
     pub(super) fn open_class(&mut self) {
         let query = web_sys::window().and_then(|window| window.location().search().ok());
         let Some(query) = query.filter(|query| query.starts_with(QUERY)) else { return };
@@ -146,7 +147,6 @@ impl App {
         }
     }
 
-    /// Handles a message of the class.
     fn hear_class(&mut self, text: &str) {
         let Some(class) = &mut self.class else { return };
         class.hear();
@@ -235,7 +235,8 @@ impl App {
         }
     }
 
-    /// Handles the news of who has the class's real arm. Begins or ends to drive it.
+    /// Shows who has the class's real arm. Begins to drive the arm when this pupil gets it, and returns to the simulated arm when
+    /// this pupil loses it.
     fn show_real_arm(&mut self, arm: Option<LentArm>, over: Option<LeaseEnd>) {
         let text = arm.as_ref().map_or(String::new(), |arm| {
             let time = format!("{}:{:02}", arm.seconds / 60, arm.seconds % 60);
@@ -251,7 +252,7 @@ impl App {
         let (was_own, is_own) = (is_own(&class.arm), is_own(&arm));
         class.arm = arm;
         match (was_own, is_own, over) {
-            // The teacher gave the arm to this pupil again: the server closed the connection of the earlier lease.
+            // In the second case the teacher gave the arm to this pupil again: the server closed the connection of the old lease.
             (false, true, _) | (true, true, Some(_)) => self.begin_real_arm(),
             (true, false, over) => self.end_real_arm(Some(match over {
                 Some(LeaseEnd::Time) => "arm-over-time",
@@ -290,7 +291,8 @@ impl App {
         }
     }
 
-    /// Returns to the simulated arm. `text` is the name of the text that gives the reason; `None` shows no notice.
+    /// Ends the lease on this page, and returns to the simulated arm if the page drove the real one. `text` is the name of the
+    /// text that gives the reason; `None` shows no notice.
     fn end_real_arm(&mut self, text: Option<&'static str>) {
         self.dom.set_text("class-arm", "");
         self.dom.set_hidden("stop-class-arm", true);

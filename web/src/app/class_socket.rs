@@ -10,18 +10,18 @@ use web_sys::{Event, MessageEvent, WebSocket};
 
 use crate::source::socket::address;
 
-/// A connection to the class.
 pub(super) struct ClassSocket {
     socket: WebSocket,
     is_closed: Rc<Cell<bool>>,
-    // The browser calls these while the socket is open.
+    // Kept, because the browser calls these closures until the socket is dropped.
     _opened: Closure<dyn FnMut(Event)>,
     _message: Closure<dyn FnMut(MessageEvent)>,
     _closed: Closure<dyn FnMut(Event)>,
 }
 
 impl ClassSocket {
-    /// Connects to the class of the server that this page came from.
+    /// Connects to the class of the server that this page came from. Calls `opened` when the connection is open, and `heard` with
+    /// each message.
     pub(super) fn connect(
         code: &str,
         mut opened: impl FnMut() + 'static,

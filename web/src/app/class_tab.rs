@@ -5,8 +5,8 @@ use classroom::LentArm;
 use super::class_socket::ClassSocket;
 use crate::class::Membership;
 
-/// The connection counts as lost after this silence of the server, in milliseconds. The server asks a tab that does not answer
-/// every 4 s, and other tabs more often.
+/// The connection counts as lost after this silence of the server, in milliseconds. The server sends each tab a question at
+/// least every 4 s.
 const SILENCE_MS: f64 = 10_000.0;
 /// One check adds at most this to the measured silence, in milliseconds.
 const LONGEST_LOOK_MS: f64 = 1_000.0;
@@ -46,7 +46,8 @@ impl ClassTab {
         self.silence.0 = 0.0;
     }
 
-    /// Checks at `time` whether the connection is lost: closed, or silent for too long, as after a network failure.
+    /// Adds the time since the last check to the silence. Returns true if the connection is lost: closed, or silent for too long,
+    /// as after a network failure.
     pub(super) fn is_lost(&mut self, time: f64) -> bool {
         let (silence, last) = self.silence;
         // Limit the share of one check: after a suspend, it may run before the browser delivers the waiting messages.

@@ -1,4 +1,4 @@
-//! The page's connection to an arm: how the user chooses it, how it ends, and a server that lets the page only watch.
+//! The page's connection to an arm: how the user chooses it, how it ends, and what is disabled while the server is read-only.
 
 use host_link::sharing::SharingState;
 use wasm_bindgen::JsValue;
@@ -11,14 +11,14 @@ use crate::source::LineState;
 use crate::source::serial::SerialSource;
 use crate::source::socket::SocketSource;
 
-/// The selectors of all controls that move an arm.
+/// The selectors of the controls that move or stop an arm, or write its registers.
 const DRIVING: &str = "#stop, [data-action=stop], #joints input, #tip-x, #tip-y, #tip-z, #joint-speed, \
      [data-action=motors], [data-action=home], [data-action=park], [data-action=grip], [data-action=pump], \
      [data-action=run], [data-action=step], [data-action=play], [data-register]";
 
 impl App {
-    /// Connects to the arm behind the server if the page's address has a token, or else to a simulated arm. Shows the tour on the
-    /// first visit.
+    /// Connects to the arm behind the server if the page's address has a token. If not, the page keeps its simulated arm. Shows
+    /// the tour on the first visit.
     pub(super) fn show_first_arm(&mut self) {
         let query = web_sys::window().and_then(|window| window.location().search().ok());
         if query.is_some_and(|query| query.contains("token=")) {
@@ -52,10 +52,10 @@ impl App {
         }
     }
 
-    /// Connects to the arm behind the server. In a class that is the real arm.
+    /// Connects to the arm behind the server: in a class, to the class's real arm.
     ///
     /// # Errors
-    /// The browser refuses the address, or another pupil has the real arm.
+    /// The browser refuses the address, or this pupil does not have the class's real arm.
     fn server_arm(&self) -> Result<SocketSource, JsValue> {
         match &self.class {
             None => SocketSource::connect(),
@@ -63,7 +63,8 @@ impl App {
         }
     }
 
-    /// Shows once that the connection has ended, and what to do. The page does not reconnect: a new server has another token.
+    /// Shows once that the connection has ended, and what to do. Outside a class the page does not reconnect: a new server has
+    /// another token.
     pub(super) fn tell_end_of_line(&mut self) {
         let LineState::Closed(reason) = self.line_state() else { return };
         if std::mem::replace(&mut self.is_end_told, true) {

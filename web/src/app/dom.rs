@@ -1,11 +1,10 @@
-//! The elements of the page.
+//! Finds and changes the elements of the page.
 
 use wasm_bindgen::{JsCast, JsValue};
 use web_sys::{Document, Element, HtmlCanvasElement, HtmlElement, HtmlInputElement, HtmlSelectElement};
 
 use crate::texts::Language;
 
-/// The document of the page.
 #[derive(Clone)]
 pub(super) struct Dom(pub(super) Document);
 
@@ -15,7 +14,7 @@ impl Dom {
         Ok(Self(window.document().ok_or("no document")?))
     }
 
-    /// The element with this identifier.
+    /// The element with this identifier. Fails if the page has no such element, or if its type is not `E`.
     pub(super) fn get<E: JsCast>(&self, id: &str) -> Result<E, JsValue> {
         let element = self.0.get_element_by_id(id);
         let element = element.ok_or_else(|| JsValue::from(format!("the page has no {id}")))?;
@@ -91,7 +90,6 @@ impl Dom {
         }
     }
 
-    /// Shows a notice.
     pub(super) fn notice(&self, text: &str) {
         self.set_text("notice", text);
         self.set_hidden("notice-bar", false);
@@ -103,7 +101,6 @@ impl Dom {
         self.notice(&format!("{} {reason}", language.text("no-picture")));
     }
 
-    /// Removes the notice.
     pub(super) fn end_notice(&self) {
         self.set_hidden("notice-bar", true);
         self.set_text("notice", "");
@@ -116,7 +113,6 @@ impl Dom {
         }
     }
 
-    /// Does this element have the keyboard's focus?
     pub(super) fn has_focus(&self, element: &Element) -> bool {
         self.0.active_element().is_some_and(|active| active == *element)
     }

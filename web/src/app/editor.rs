@@ -21,8 +21,8 @@ const SCRIPT: &str = "editor-script";
 pub(super) struct Editor;
 
 impl Editor {
-    /// Loads the script, unless it is loaded or being loaded. Calls `loaded` afterwards, or `failed`. After a failure the next
-    /// call tries again.
+    /// Loads the script, and then calls `loaded`, or `failed` if the browser cannot load it. Has no effect if the script is
+    /// loaded or being loaded. After a failure the next call tries again.
     pub(super) fn load(self, dom: &Dom, loaded: fn(&mut App), failed: fn(&mut App)) -> Result<(), JsValue> {
         if object().is_some() || dom.element(SCRIPT).is_some() {
             return Ok(());
@@ -53,7 +53,6 @@ impl Editor {
         Ok(())
     }
 
-    /// Is the script loaded?
     pub(super) fn is_loaded(self) -> bool {
         object().is_some()
     }
@@ -71,7 +70,8 @@ impl Editor {
         call("text", &[])?.as_string()
     }
 
-    /// Shows a program. Returns an empty text, or the error if the text is no program: then the last program stays.
+    /// Replaces the program, and returns an empty text. If the new text is no program, keeps the old program and returns the
+    /// error. With `can_undo`, the user can undo the replacement.
     pub(super) fn show(self, program: &str, can_undo: bool) -> String {
         call("load", &[program.into(), can_undo.into()]).and_then(|why| why.as_string()).unwrap_or_default()
     }
@@ -102,7 +102,7 @@ impl Editor {
         call("pack", &[program.into()])?.dyn_into().ok()
     }
 
-    /// Decodes the letters of an address to a program. The promise gives a string, which is empty if the letters hold no program.
+    /// Decodes the letters of an address to a program. The promise gives a string, which is empty if the decoding fails.
     pub(super) fn unpack(self, letters: &str) -> Option<Promise> {
         call("unpack", &[letters.into()])?.dyn_into().ok()
     }

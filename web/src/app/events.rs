@@ -112,7 +112,7 @@ impl App {
             return;
         }
         let now = self.now();
-        // End a movement first: its stream would take a new target as one point, and its next point would lead back.
+        // End a movement first: in its stream, a new target would count as one point, and the next point would lead back.
         let moves = [MOTOR_STATE, TARGET_POSITION, FINE_TARGET].iter().any(|row| row.holds(address));
         if moves {
             self.hide_time_line();
@@ -127,7 +127,7 @@ impl App {
         field.as_ref().and_then(number).filter(|degrees| (0.0..=180.0).contains(degrees)).unwrap_or(60.0)
     }
 
-    /// Removes the faults of a simulated arm. Then makes joints try again that are blocked or let go (D27, D28).
+    /// Removes the faults of a simulated arm. If its motors are on, the joints that are blocked or let go try again (D27, D28).
     fn repair(&mut self) {
         self.act_on_simulation("clear");
         let state = self.client.state();
@@ -157,7 +157,7 @@ impl App {
         }
     }
 
-    /// A file with a scene was opened.
+    /// Opens the text of a file with a scene, and sets up the scene in the simulation.
     fn open_scene(&mut self, text: String) {
         match text.parse::<Scene>() {
             Ok(scene) => self.act_on_simulation(&format!("scene {scene}")),

@@ -78,7 +78,7 @@ impl App {
         self.show_exercise();
     }
 
-    /// Passes the new registers to the attempt.
+    /// Passes the new registers and the things of a simulated arm's room to the attempt. Shows each goal that is reached.
     pub(super) fn observe_exercise(&mut self, now: Instant) {
         let seen = observation(now, self.client.registers(), self.world());
         let Some(attempt) = &mut self.exercises.attempt else { return };
@@ -149,7 +149,7 @@ impl App {
     }
 }
 
-/// The lines of the goals in the language of a tag, each with a mark whether it is reached.
+/// One line for each goal, in the language of a tag, with a mark that tells whether the goal is reached.
 fn lines(exercise: &Exercise, attempt: Option<&Attempt>, tag: &str) -> impl Iterator<Item = String> {
     let reached = attempt.map(|attempt| attempt.reached().collect::<Vec<_>>()).unwrap_or_default();
     exercise.goals.iter().enumerate().map(move |(index, goal)| {

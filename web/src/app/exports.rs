@@ -6,7 +6,7 @@ use wasm_bindgen::prelude::wasm_bindgen;
 use super::page::with_app;
 use crate::arm_state::tip;
 
-/// What the page shows: angles and targets in degrees, the tip in mm.
+/// The state of the page as JSON: angles and targets in degrees, the tip in mm, the time in microseconds.
 #[wasm_bindgen]
 #[must_use]
 pub fn state() -> String {
@@ -30,7 +30,8 @@ pub fn state() -> String {
     .unwrap_or_default()
 }
 
-/// Where a point in mm is drawn, in CSS pixels from the top left of the page's window.
+/// Projects a point in mm to CSS pixels from the top left of the page's window. `None` if there is no picture of the arm, or if
+/// the point is behind the camera.
 #[wasm_bindgen]
 #[must_use]
 pub fn project(x: f32, y: f32, z: f32) -> Option<Vec<f64>> {
@@ -41,7 +42,7 @@ pub fn project(x: f32, y: f32, z: f32) -> Option<Vec<f64>> {
     })?
 }
 
-/// The number of frames since the start.
+/// The number of calls of `App::frame` since the start. The browser makes one before each picture.
 #[wasm_bindgen]
 #[must_use]
 pub fn frame_count() -> u32 {

@@ -6,7 +6,7 @@ use sevenbot::recording::{Recording, RecordingError};
 
 use super::storage;
 
-/// Its name in the browser's storage.
+/// The key of the recording in the browser's storage.
 const KEPT: &str = "recording";
 
 /// The recording of the page: recorded, or opened from a file.

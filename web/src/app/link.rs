@@ -57,7 +57,7 @@ impl App {
             }
             return;
         }
-        // Remove the fragment, so that a reload shows the edited program, not the one of the link.
+        // Remove the fragment, so that a reload shows the edited program, not the program of the link.
         let address = window.location().pathname().unwrap_or_default()
             + &window.location().search().unwrap_or_default();
         if let Ok(history) = window.history() {

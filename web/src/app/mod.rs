@@ -6,6 +6,9 @@
 //!     └── bytes ──┴── events of a person
 //! ```
 //!
+//! The main files: an arrow leads from a file to files that import it. class.rs, programs.rs and exercises.rs, with the files
+//! that they import, add the class, the programs of blocks and the exercises to `App`.
+//!
 //! ```text
 //!   dom.rs, storage.rs, kept_recording.rs ──▶ page.rs ──▶ panels.rs, hand.rs, recording.rs, ──▶ controls.rs
 //!   (the browser's elements and storage)     (App)      time_line.rs (what it shows,         (numbers and
@@ -54,7 +57,7 @@ use page::{App, with_app};
 /// Starts the page.
 ///
 /// # Errors
-/// The page lacks an element.
+/// The page lacks an element, or the browser refuses something that the page needs, such as a 2D canvas.
 #[wasm_bindgen]
 pub fn start() -> Result<(), JsValue> {
     let dom = Dom::of_window()?;

@@ -12,8 +12,8 @@ use crate::stop::StopProgress;
 use crate::words;
 
 impl App {
-    /// Ends the park, movement or program in progress. Returns the registers from before it, whose speeds and times it restores;
-    /// `None` if there was none.
+    /// Ends the park, movement or program in progress, and restores the speeds and times. Returns the registers from before the
+    /// park, movement or program; `None` if nothing was in progress.
     pub(super) fn end_movement(&mut self) -> Option<Snapshot> {
         let now = self.now();
         if let Some(park) = self.take_park() {
@@ -27,21 +27,21 @@ impl App {
         self.end_program()
     }
 
-    /// Takes the park in progress, and removes its notice.
+    /// Removes the park in progress without ending it, and its notice. `None` if there is no park.
     fn take_park(&mut self) -> Option<Park> {
         let park = self.park.take()?;
         self.dom.end_notice_of(self.language.text("parking"));
         Some(park)
     }
 
-    /// Ends the park, movement or program in progress. Returns the registers with the speeds and times to restore later: those
-    /// from before it, or the present ones.
+    /// Ends the park, movement or program in progress. Returns the registers whose speeds and times have to be restored later:
+    /// the registers from before it, or the present ones if nothing was in progress.
     pub(super) fn registers_before_movement(&mut self) -> Snapshot {
         self.end_movement().unwrap_or_else(|| self.client.registers().clone())
     }
 
-    /// Is a stop in progress? Until it is confirmed, the joints have temporary speeds. Nothing may begin that would restore these
-    /// later. Shows a notice if so.
+    /// Returns true and shows a notice if a stop is not confirmed yet. Until then the joints have temporary speeds, and nothing
+    /// may begin that would save these and restore them later.
     pub(super) fn is_stopping(&self) -> bool {
         let is_stopping = self.client.stop_progress() == StopProgress::Verifying;
         if is_stopping {
@@ -60,7 +60,7 @@ impl App {
         self.dom.notice(self.language.text("parking"));
     }
 
-    /// Continues a park.
+    /// Continues a park. Shows a notice at its end.
     pub(super) fn park_on(&mut self, now: Instant) {
         let Some(mut park) = self.park.take() else { return };
         match park.poll(now, &mut self.client) {
@@ -70,7 +70,7 @@ impl App {
         }
     }
 
-    /// Continues a played movement.
+    /// Continues a played movement. Shows a notice if it fails.
     pub(super) fn play_on(&mut self, now: Instant) {
         let Some(mut player) = self.player.take() else { return };
         match player.poll(now, &mut self.client) {

@@ -55,7 +55,7 @@ impl Line {
     }
 }
 
-/// The state of the page.
+/// The state of the page. The browser's handlers reach it by [`with_app`].
 pub(super) struct App {
     pub(super) dom: Dom,
     pub(super) line: Line,
@@ -76,7 +76,7 @@ pub(super) struct App {
     pub(super) last_frame: f64,
     /// The last round of reads that was handled.
     pub(super) shown_round: u64,
-    /// Before this round of reads, the registers may not show the target that a slider or field has set.
+    /// Before this round of reads, the registers may still hold the target from before the last input in a slider or field.
     pub(super) slid_round: u64,
     pub(super) frames: u32,
     pub(super) hovered: Option<Part>,
@@ -256,7 +256,8 @@ impl App {
         }
     }
 
-    /// Sends the frames that are due, lets this virtual time pass, in milliseconds, and takes the bytes of the arm.
+    /// Continues a park, movement or program, sends the frames that are due, advances a simulated arm by `virtual_ms`, or less
+    /// when the browser's clock reaches `until`, and takes the bytes of the arm.
     fn exchange(&mut self, virtual_ms: f64, until: f64) {
         let now = self.now();
         self.play(now);

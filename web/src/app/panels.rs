@@ -1,4 +1,4 @@
-//! Everything that the page shows outside the picture of the arm and the plot.
+//! The panels that show the state of the arm: the line of its state, joints, tip, supply, recording, frames and registers.
 
 use std::fmt::Display;
 use std::str::FromStr;
@@ -274,7 +274,6 @@ fn is_writable(address: u8) -> bool {
     sevenbot::map::find(address).is_some_and(|row| row.access == Access::ReadWrite)
 }
 
-/// Is this panel open?
 fn is_open(dom: &Dom, id: &str) -> bool {
     dom.element(id).is_some_and(|panel| panel.has_attribute("open"))
 }

@@ -1,4 +1,4 @@
-//! Draws the arm in 3D and the plot, before each picture of the browser.
+//! Draws the arm in 3D and the plot, and updates the panels, before each picture of the browser.
 
 use arm_sim::world::World;
 use sevenbot::map::{fault, motor_state};

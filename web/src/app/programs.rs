@@ -59,8 +59,8 @@ impl App {
         self.dom.notice(self.language.text("no-editor"));
     }
 
-    /// Shows the editor after it was loaded, with the stored program. A program in the page's address, or one that is wanted,
-    /// replaces the stored one.
+    /// Shows the editor after it was loaded, with the stored program. The program of the page's address, or the program in
+    /// `Programs::wanted`, replaces the stored one.
     fn show_editor(&mut self) {
         let Some(element) = self.dom.element("blocks") else { return };
         Editor.open(&element, self.language.tag(), Self::program_changed);
@@ -74,7 +74,7 @@ impl App {
         }
     }
 
-    /// Opens the panel of programs with this program. Undo brings the last program back.
+    /// Opens the panel of programs with this program. The user can undo the replacement of the old program.
     pub(super) fn show_in_editor(&mut self, text: String) {
         if !self.programs.is_open {
             self.toggle_programs();
@@ -153,7 +153,7 @@ impl App {
         }
     }
 
-    /// Continues the running program.
+    /// Continues the running program. If it fails, shows the reason at its block and as a notice.
     pub(super) fn run_on(&mut self, now: Instant) {
         let Some(run) = &mut self.programs.run else { return };
         let failure = match run.poll(now, &mut self.client) {
@@ -187,8 +187,8 @@ impl App {
         self.dom.set_text("program-state", doing.map_or("", |name| self.language.text(name)));
     }
 
-    /// Ends the running program, because something else is about to move the arm. Returns the registers from before it; `None` if
-    /// no program runs.
+    /// Ends the running program, because something else is about to move the arm. Returns the registers from before the program;
+    /// `None` if no program runs.
     pub(super) fn end_program(&mut self) -> Option<Snapshot> {
         let (run, now) = (self.programs.run.take()?, self.now());
         let before = run.before().clone();

@@ -10,7 +10,7 @@ thread_local! {
 
 #[wasm_bindgen]
 extern "C" {
-    /// Loads the rest, unless it is loaded. Blocks until then. A function of `start.js`.
+    /// `loadRest` of `start.js`: loads the rest, unless it is loaded. Blocks until it is loaded.
     #[wasm_bindgen(js_name = loadRest)]
     fn load_rest();
 }

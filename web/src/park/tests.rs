@@ -1,4 +1,4 @@
-//! Parks of a simulated arm, with faults on the way and while the arm is watched.
+//! Parks of a simulated arm: without a fault, and with faults before the start, on the way and while the arm is watched.
 
 use super::*;
 use crate::stop::StopProgress;

@@ -7,7 +7,7 @@ use super::axis::Axis;
 use super::history::{History, Quantity};
 use crate::scene::theme::{Palette, Theme};
 
-/// Margins of the plot, in CSS pixels. The numbers are to the left and below.
+/// Margins of the plot, in CSS pixels. The left and the lower margin hold the numbers of the axes.
 const LEFT: f64 = 44.0;
 const BELOW: f64 = 20.0;
 const RIGHT: f64 = 8.0;

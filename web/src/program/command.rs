@@ -86,7 +86,7 @@ impl Action {
     }
 }
 
-/// Begins a command of a block.
+/// Begins a command: writes the first frames, if the command has any. Returns the action that carries it out.
 pub(super) fn begin(command: &Command, now: Instant, client: &mut Client) -> Result<Action, ProgramFailure> {
     match command {
         Command::Wait(time) => Ok(Action::Waiting(since_start(now) + *time)),

@@ -1,4 +1,4 @@
-//! Why a program ends early.
+//! The reasons for which a program ends early.
 
 use block_programs::{BlockId, ProgramError};
 use sevenbot::Joint;

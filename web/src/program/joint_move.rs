@@ -97,14 +97,15 @@ impl JointMove {
         }
     }
 
-    /// Returns true unless these registers show a new alarm, which no later check would see.
+    /// Returns `Ok(true)`, or fails if these registers show a new alarm, which no later check would see.
     fn arrived(&mut self, now: Duration, registers: &Snapshot) -> Result<bool, ProgramFailure> {
         self.watch.end();
         self.watch.registers(now, registers)?;
         Ok(true)
     }
 
-    /// The joints whose targets in the registers differ from these, except the claw: something else moves them.
+    /// The joints, except the claw, whose targets in the registers differ from the targets of this move: something else moves
+    /// them.
     fn other_targets(&self, health: &Health) -> Vec<Joint> {
         let joints = health.joints.iter().zip(&self.targets);
         let other = joints.filter(|(joint, target)| {

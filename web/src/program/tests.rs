@@ -76,7 +76,7 @@ fn a_program_ends_where_the_arm_does_not_carry_it_out() {
         ("fault supply=off", "does not answer"),
         ("power-cycle", "restarted"),
         ("halt", "does not answer"),
-        // Of a joint that the program does not move.
+        // The program does not move joint 7.
         ("trip 7", "overload"),
     ] {
         let mut tab = Tab::new();
@@ -93,7 +93,7 @@ fn a_program_ends_where_the_arm_does_not_carry_it_out() {
     }
 }
 
-/// The program turns the joint at 20 degrees/s. With the restored speed the joint would continue at 114 degrees/s (D11).
+/// The program turns the joint at 19 degrees/s. With the restored speed the joint would continue at 114 degrees/s (D11).
 #[test]
 fn d11_a_joint_on_its_way_holds_when_another_joint_is_moved() {
     let mut tab = Tab::new();
@@ -210,7 +210,7 @@ fn a_page_that_pauses_ends_its_program() {
     assert!(matches!(end, ProgramProgress::Failed(ProgramFailure::Arm(PlayFailure::Paused(_)))), "{end:?}");
 }
 
-/// A block that moves the arm or waits, without its last brace.
+/// The members of a block that moves the arm or switches the pump, without the braces of the block.
 fn any_block() -> impl Strategy<Value = String> {
     let number =
         |number: i32| format!(r#"{{"block": {{"type": "math_number", "fields": {{"NUM": {number}}}}}}}"#);

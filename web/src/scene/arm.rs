@@ -9,7 +9,7 @@ use super::camera::Ray;
 /// Angles of joints 1 to 7 in degrees, as in the registers.
 pub type Angles = [f32; 7];
 
-/// The number of bodies.
+/// The number of bodies. The vertex shader of the arm has the same number as a literal.
 pub const BODIES: usize = Body::ALL.len();
 
 /// What a person can point at.
@@ -81,7 +81,7 @@ impl Arm {
     }
 }
 
-/// For each body, the transform from its coordinates to those of the arm, in mm.
+/// For each body, the transform from the coordinates of the body to the coordinates of the arm, in mm.
 #[must_use]
 pub fn transforms(angles: Angles) -> [(Body, Affine3A); BODIES] {
     poses(angles.map(f64::from)).map(|(body, pose)| {

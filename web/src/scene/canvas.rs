@@ -59,7 +59,7 @@ impl Scene {
         Ok(Self { canvas, gl, arm, camera, pointer, ratio, renderer, drawn: None, is_restored })
     }
 
-    /// Draws a view, unless the last picture was the same or the graphics context is lost. Returns whether it drew.
+    /// Draws a view. Returns false without drawing if the picture equals the last one, or while the graphics context is lost.
     ///
     /// # Errors
     /// The graphics driver reports an error after the browser has restored a lost graphics context.
@@ -123,7 +123,7 @@ impl Scene {
         self.pointer.down((id, Vec2::new(x, y), button), &self.arm, &self.camera, angles)
     }
 
-    /// Handles a pointer that moved, with the same parameters as [`Self::pointer_down`].
+    /// Handles a pointer that moved. Position and angles are as for [`Self::pointer_down`].
     pub fn pointer_moved(&mut self, id: i32, [x, y]: [f32; 2], angles: Angles) -> Option<SceneEvent> {
         self.pointer.moved((id, Vec2::new(x, y)), &self.arm, &mut self.camera, angles)
     }

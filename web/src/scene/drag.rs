@@ -15,7 +15,7 @@ const SEARCH: f32 = 24.0;
 /// The cost of a turn, in square pixels per square degree. It keeps the angle if a turn hardly moves the point on the screen.
 const COST_OF_TURNING: f32 = 0.02;
 
-/// A drag of a joint by a point of its part. The joint follows the angle that brings the point nearest to the pointer.
+/// A drag of a joint by a point of its part. The joint takes the angle that brings the point nearest to the pointer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointDrag {
     joint: u8,
@@ -132,7 +132,7 @@ pub struct Unreachable {
 }
 
 /// Solves the inverse kinematics for a position of the tip in mm, with the same direction of the tool as at `angles`. Joints 6
-/// and 7 keep their angles. The guard of the workspace has to allow the pose: no part of it below the table or in the base.
+/// and 7 keep their angles. The guard of the workspace has to allow the pose: no part of the arm below the table or in the base.
 #[must_use]
 pub fn wish(tip: Vec3, angles: Angles) -> TipWish {
     let [t1, t2, t3, t4, t5, t6, _] = angles.map(f64::from);
@@ -155,7 +155,8 @@ fn allowed(angles: Angles) -> Result<(), Unreachable> {
     Guard::default().check_pose([t1, t2, t3, t4, t5]).map_err(refused)
 }
 
-/// The solution for a position whose largest turn of a joint, from `angles`, is the smallest.
+/// The solution for a position of the tip that is nearest to `angles`: the largest turn of a joint is smallest. `None` if there
+/// is no solution.
 fn nearest_solution(tip: Vec3, angles: Angles) -> Option<Angles> {
     let [t1, t2, t3, t4, t5, t6, _] = angles.map(f64::from);
     let tool = forward([t1, t2, t3, t4, t5, t6]).hand.tool;
@@ -176,12 +177,12 @@ fn extended(solution: [f64; 5], angles: Angles) -> Angles {
     [t1, t2, t3, t4, t5, t6, t7]
 }
 
-/// A drag of the tip, in the plane through its start that is parallel to the screen.
+/// A drag of the tip. The tip moves in the plane through its first position that is parallel to the screen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TipDrag {
     /// The vector from the projected tip to the pointer at the start, in CSS pixels.
     offset: Vec2,
-    /// The angles at the start. The tool keeps the direction that it has at these.
+    /// The angles at the start. The tool keeps its direction from there.
     start: Angles,
 }
 
@@ -209,7 +210,7 @@ mod tests {
 
     const POSE: Angles = [90.0, 100.0, 75.0, 80.0, 110.0, 70.0, 60.0];
 
-    /// A point of the part of each joint, away from its axis.
+    /// For each joint, a point of the part that it moves, away from the axis of the joint.
     const GRIPS: [(Body, [f32; 3]); 7] = [
         (Body::Turret, [40.0, 34.0, 20.0]),
         (Body::RearArm, [0.0, 30.0, 100.0]),

@@ -22,15 +22,15 @@ const DASH: f32 = 6.0;
 #[expect(clippy::cast_possible_truncation, reason = "a whole number of millimetres")]
 pub const TABLE: f32 = -BASE_HEIGHT as f32;
 
-/// An end of a line: x, y, z in mm, then red, green, blue and opacity from 0 to 1.
+/// An end of a line, or a corner of a triangle without lighting: x, y, z in mm, then red, green, blue and opacity from 0 to 1.
 pub type LineEnd = [f32; 7];
 
 /// The lines of a view, two ends for each line.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Lines {
-    /// Drawn before the arm, so that the arm hides them.
+    /// Lines that are drawn before the arm, so that the arm hides them.
     pub ground: Vec<LineEnd>,
-    /// Drawn after the arm, without a depth test.
+    /// Lines that are drawn after the arm without a depth test, so that nothing hides them.
     pub over: Vec<LineEnd>,
 }
 

@@ -33,7 +33,7 @@ pub enum Theme {
 /// The colours of a theme.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Palette {
-    /// Behind everything.
+    /// The background of the scene.
     pub background: Rgb,
     /// The table under the arm.
     pub table: Rgb,
@@ -47,7 +47,7 @@ pub struct Palette {
     pub dark: Rgb,
     /// Shadow on the table.
     pub shadow: Rgb,
-    /// The ghost of the targets.
+    /// The ghost of the arm, at its targets or at a moment of a time line.
     pub ghost: Rgb,
     /// The marker of the tip.
     pub tip: Rgb,

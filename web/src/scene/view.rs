@@ -14,7 +14,7 @@ pub struct Thing {
     pub axes: [Vec3; 3],
     /// True for a cylinder along the third axis, false for a box.
     pub is_round: bool,
-    /// The colour with which its name begins; `None` if it begins with no colour.
+    /// The colour whose name is the beginning of the thing's name, such as `red`; `None` if there is none.
     pub named: Option<Rgb>,
     /// True for a wall, which never moves.
     pub is_wall: bool,
@@ -31,11 +31,11 @@ pub struct View {
     pub colours: [Rgb; 7],
     /// A wanted position of the tip, in mm, that the arm cannot reach.
     pub unreachable: Option<Vec3>,
-    /// What stands on the table, and what the arm carries.
+    /// The walls, the things on the table, and the thing that the arm carries.
     pub things: Vec<Thing>,
     /// The part under the pointer.
     pub hovered: Option<Part>,
-    /// The colours.
+    /// The theme of the page: light or dark.
     pub theme: Theme,
 }
 
@@ -54,7 +54,8 @@ impl Default for View {
 }
 
 impl View {
-    /// The angles of the ghost. `None` if no joint differs from its measured angle by more than 1 degree: it is not drawn.
+    /// The angles of the ghost. `None` if no ghost is drawn: there are no `targets`, or no joint differs from its measured angle
+    /// by more than 1 degree.
     #[must_use]
     pub fn ghost(&self) -> Option<Angles> {
         let differs = |ghost: &Angles| {

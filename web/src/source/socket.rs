@@ -13,7 +13,7 @@ use super::{LineState, Source};
 pub struct SocketSource {
     socket: WebSocket,
     shared: Rc<RefCell<Shared>>,
-    // The browser calls these while the socket is open.
+    // Kept, because the browser calls these closures until the socket is dropped.
     _message: Closure<dyn FnMut(MessageEvent)>,
     _close: Closure<dyn FnMut(CloseEvent)>,
 }

@@ -8,7 +8,7 @@ fn program(blocks: &str) -> Result<Program, ProgramError> {
     ))
 }
 
-/// The start block with these blocks below it, each without its last brace.
+/// The start block with these blocks below it, in the form that `stack` takes.
 fn start(blocks: &[String]) -> String {
     format!(r#"{{"type": "arm_start", "id": "start", "next": {}}}"#, stack(blocks))
 }

@@ -1,6 +1,6 @@
 //! A class in browsers: the teacher's screen, and pupils' tabs.
 //!
-//! Thirty tabs for ten minutes, or for `CLASS_SECONDS`:
+//! This command runs the test with thirty tabs, here for 120 s. Without `CLASS_SECONDS` it takes ten minutes:
 //!
 //! ```sh
 //! CLASS_SECONDS=120 cargo test -p browser-tests --test browser -- thirty --ignored --nocapture
@@ -15,7 +15,7 @@ use system_tests::wait::wait_for;
 
 use crate::programs::{SLOW, open_file, open_programs};
 
-/// The tabs of a class.
+/// The number of pupils' tabs in [`thirty_tabs_stop_together`].
 const TABS: usize = 30;
 /// No WebGL, and five pictures a second. In a class each of thirty laptops draws its own arm, but this computer would draw all of
 /// them in software.
@@ -51,7 +51,7 @@ fn click_tile(teacher: &mut Page, name: &str) {
     ));
 }
 
-/// Runs a program that turns joint 1 for a minute.
+/// Runs [`SLOW`], and waits until it has begun.
 fn run_slow_program(class: &ClassRun, page: &mut Page) {
     open_programs(page);
     let file = class.path("slow.json");
@@ -76,7 +76,7 @@ fn a_stop_for_all_ends_the_programs_of_the_pupils_and_says_who_stopped() {
     }
     wait_for_tile(&mut teacher, "Mia", ".doing", "a program runs");
     wait_for_tile(&mut teacher, "Mia 2", ".doing", "a program runs");
-    // The space bar stops all from everywhere.
+    // The space bar stops all arms, whatever has the focus.
     teacher.focus("[data-action=language]");
     teacher.key(" ");
     teacher.wait_for_text("#state", "Last stop: confirmed by all arms (2)");
@@ -169,7 +169,7 @@ fn the_real_arm_is_given_driven_and_taken_back() {
     teacher.wait_for_text("#arm-state", "nobody has it · holds");
     assert_eq!(mia.evaluate("document.querySelector('#source').value"), "simulator");
     mia.wait_until_joint_rests(1, 110.0);
-    // The time is over.
+    // Leo gets the arm for 3 s.
     teacher.evaluate("document.querySelector('#minutes').value = 0.05");
     click_tile(&mut teacher, "Leo");
     leo.wait_for_text("#class-arm", "You have the class's real arm for");
@@ -254,7 +254,7 @@ fn a_stop_without_a_connection_is_told_not_to_be_sent() {
     wait_for_tile(&mut teacher, "Mia", ".doing", "ready");
     click_tile(&mut teacher, "Mia");
     leo.wait_for_text("#class-arm", "Mia has the class's real arm for");
-    // The button is there until the page notices the end.
+    // The page shows the button until it notices that the connection has ended.
     let of_class = socket("/class");
     leo.evaluate(&format!("[{of_class}.close(), document.querySelector('#stop-class-arm').click()]"));
     leo.wait_until_said("#notice", "NOT SENT: there is no connection to the class.");

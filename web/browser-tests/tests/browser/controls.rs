@@ -1,4 +1,5 @@
-//! The controls beside the picture: numbers, home, claw, pump, speed, the sides of the camera; and their sizes on each screen.
+//! The controls beside the picture: numbers, home, claw, pump, speed and the views of the camera; their sizes on each screen; and
+//! fingers that scroll the page.
 
 use browser_tests::page::{PHONE, Screen};
 use browser_tests::{Page, Viewed};
@@ -92,7 +93,7 @@ fn buttons_drive_claw_and_pump_and_home_and_a_list_sets_the_speed() {
     assert!(page.picture().differences(&picture) > 5_000, "the camera is above");
 }
 
-/// CSS pixels.
+/// The width of an element, in CSS pixels.
 fn width(page: &mut Page, selector: &str) -> f64 {
     page.number(&format!("document.querySelector('{selector}').getBoundingClientRect().width"))
 }
@@ -117,7 +118,7 @@ fn a_finger_beside_the_arm_or_on_a_slider_moves_the_page_and_no_joint() {
     let viewed = Viewed::without_arm();
     let mut page = viewed.open();
     page.show_on(PHONE);
-    // The arm has settled after its start.
+    // Wait until the arm has settled after its start.
     page.wait_until_ready();
     page.pass(1.0);
     let targets = page.state()["targets"].clone();
@@ -125,7 +126,7 @@ fn a_finger_beside_the_arm_or_on_a_slider_moves_the_page_and_no_joint() {
         page.evaluate("scrollTo(0, 0)");
         let [x, y] = page.centre(element);
         let scrolled = page.number("scrollY");
-        // The arm is in the middle of the picture.
+        // Beside the arm, which is in the middle of the picture.
         let x = if element == "#scene" { 20.0 } else { x };
         page.swipe([x, y], [x, y - 150.0]);
         let now = page.number("scrollY");

@@ -16,7 +16,7 @@ fn an_editor_that_cannot_be_loaded_is_told_and_loaded_once_at_the_next_attempt()
     page.click("[data-action=programs]");
     page.wait_for_text("#notice", "The editor of programs cannot be loaded.");
     page.call("Network.setBlockedURLs", json!({"urls": []}));
-    // Closed, opened, and closed and opened again while the script is on its way.
+    // Close, open and close the editor, and open it again, while the script is being loaded.
     page.evaluate("[1, 2, 3].forEach(() => document.querySelector('[data-action=programs]').click())");
     open_programs(&mut page);
     assert_eq!(page.number("document.querySelectorAll('#blocks .injectionDiv').length"), 1.0);
@@ -55,7 +55,7 @@ fn the_editor_has_the_colours_that_the_user_prefers() {
         });
         let fields = "[...new Set([...document.querySelectorAll('.blocklyNumberField')].flatMap(field =>
             [...field.querySelectorAll('rect, text')].map(part => getComputedStyle(part).fill)))].sort().join(' ')";
-        // White, and grey text on it.
+        // White fields with grey text.
         assert_eq!(page.evaluate(fields), "rgb(255, 255, 255) rgb(87, 94, 117)", "{screen:?}");
     }
 }

@@ -1,4 +1,4 @@
-//! The page after ten minutes.
+//! The memory of the page after ten minutes of virtual time.
 
 use browser_tests::Viewed;
 use serde_json::json;

@@ -1,9 +1,9 @@
-//! Exercises: what the arm does is compared with their goals.
+//! Exercises and scenes: goals, hints, solutions, and files of the user.
 
 use browser_tests::{Page, Viewed};
 use system_tests::wait::wait_until;
 
-/// Opens the page, and begins the exercise with this number.
+/// Opens the page, and begins the exercise with this index in the list, from 0.
 fn begun(viewed: &Viewed, number: &str) -> Page {
     let mut page = viewed.open();
     page.click("[data-action=exercises]");

@@ -1,4 +1,4 @@
-//! Faults of the simulated arm, in colour and in words.
+//! Faults of the simulated arm, in colour and in words; and writes in the table of registers.
 
 use browser_tests::picture::Picture;
 use browser_tests::{Page, Viewed};
@@ -76,7 +76,7 @@ fn a_weak_supply_is_said_and_shown() {
     assert_eq!(faulty(&scene(&mut page)), 0);
     page.click("[data-action=fault]");
     page.wait_for_text("#state", "The supply of a servo is too low or too high");
-    // Load lowers it below the 4.8 V of the supply.
+    // The load lowers the voltage below the 4.8 V of the supply.
     page.wait_for_text("#health", "Supply 4.");
     let red = faulty(&scene(&mut page));
     assert!(red > 500, "{red} pixels");

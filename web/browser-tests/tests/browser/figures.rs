@@ -3,13 +3,13 @@
 use browser_tests::{Page, Viewed};
 use system_tests::wait::wait_for;
 
-/// Stores when the page drew its first picture, in milliseconds after the request, and the same again after a reload.
+/// Stores the time from the request of the page to its first picture, in milliseconds. After a reload, appends the new time.
 const FIRST_PICTURE: &str = "
     (function look() {
       if (!(window.sevenbot?.frame_count() > 0)) return setTimeout(look, 1);
       sessionStorage.firstPictures = (sessionStorage.firstPictures ?? '') + ' ' + Math.round(performance.now());
     })();";
-/// How long something is counted, in seconds.
+/// The time over which [`rate`] counts, in seconds.
 const SECONDS: f64 = 5.0;
 
 /// The increase of a counter of the page per second.

@@ -1,4 +1,4 @@
-//! The page in another browser.
+//! The page in Firefox. All other tests use Chromium.
 
 use browser_tests::Viewed;
 use browser_tests::firefox::Firefox;

@@ -5,20 +5,20 @@ use browser_tests::{Page, Viewed};
 use kinematics::forward;
 use sevenbot::map::SPEED;
 
-/// The tip in mm.
+/// The tip at these angles in degrees: x, y, z in mm.
 fn tip([one, two, three, four, five, six, _]: [f64; 7]) -> [f64; 3] {
     let tip = forward([one, two, three, four, five, six]).hand.tip;
     [tip.x, tip.y, tip.z]
 }
 
-/// Where the tip is on the screen.
+/// Scrolls to the top of the page. Returns the place where the tip is drawn, in CSS pixels.
 fn tip_on_screen(page: &mut Page) -> [f64; 2] {
     page.evaluate("scrollTo(0, 0)");
     let measured = page.measured();
     page.project(tip(measured))
 }
 
-/// Where the tip would be on the screen if each joint were at its target.
+/// As [`tip_on_screen`], but for an arm with each joint at its target.
 fn sent_tip_on_screen(page: &mut Page) -> [f64; 2] {
     page.evaluate("scrollTo(0, 0)");
     let state = page.state();
@@ -124,7 +124,7 @@ fn the_tip_follows_the_mouse_and_a_position_out_of_reach_is_shown() {
     page.drag_and_hold([x, y], far);
     page.wait_for_text("#tip", "out of reach");
     wait_until_it_rests(&mut page);
-    // The ring of the wanted position: the colour of the theme for it, which the empty picture does not have.
+    // The colour of the ring at the wanted position. Without the ring, the picture does not have this colour there.
     let ring = [200, 60, 0];
     assert_eq!(empty.near(ring, 30, far, 20.0), 0);
     let picture = page.picture();
@@ -137,7 +137,7 @@ fn the_tip_follows_the_mouse_and_a_position_out_of_reach_is_shown() {
     assert_eq!(page.picture().near(ring, 30, far, 20.0), 0);
 }
 
-/// A point of the upper arm, which joint 2 turns: half-way between the joints.
+/// Scrolls to the top of the page. Returns the place of the middle of the upper arm, which joint 2 turns, in CSS pixels.
 fn on_the_upper_arm(page: &mut Page) -> [f64; 2] {
     page.evaluate("scrollTo(0, 0)");
     let [one, two, three, four, five, six, _] = page.measured();
@@ -164,7 +164,7 @@ fn a_joint_follows_the_mouse() {
 fn a_hand_moves_a_limp_arm_and_it_falls_when_let_go() {
     let viewed = Viewed::without_arm();
     let mut page = viewed.open();
-    // An arm that was never driven stays on its support.
+    // Wait until the motors have driven the arm: an arm that was never driven stays on its support.
     page.pass(1.0);
     page.click("[data-action=motors][data-value='2']");
     page.wait_for_text("#state", "The motors are off.");

@@ -38,7 +38,8 @@ fn light_and_dark_differ_and_a_phone_needs_no_sideways_scrolling() {
     }
 }
 
-/// The rules of WCAG 2 that need no judgement, in both languages and both schemes.
+/// Rules of WCAG 2 that need no judgement: names, structure and contrast. English in both colour schemes, Chinese in the dark
+/// one.
 #[test]
 fn the_page_keeps_the_rules_of_accessibility() {
     let viewed = Viewed::without_arm();
@@ -56,7 +57,7 @@ fn the_page_keeps_the_rules_of_accessibility() {
     assert_eq!(page.evaluate("document.documentElement.lang"), "en");
 }
 
-/// A screen reader has a name for each control and picture.
+/// Checks that a screen reader gets a name for each control and picture.
 fn check_names(page: &mut Page) {
     const ROLES: [&str; 8] =
         ["button", "slider", "combobox", "textbox", "checkbox", "link", "spinbutton", "image"];
@@ -90,7 +91,7 @@ fn check_structure(page: &mut Page) {
     assert_eq!(wrong, json!([]));
 }
 
-/// Each text has a contrast of at least 4.5 to what is behind it.
+/// Checks that each visible text has a contrast of at least 4.5 to its background. Texts in `.quiet` are only for screen readers.
 fn check_contrast(page: &mut Page) {
     let wrong = page.evaluate(
         "(() => {\

@@ -3,7 +3,7 @@
 use browser_tests::{Page, Viewed};
 use system_tests::wait::wait_until;
 
-/// The download that the page starts by itself never ends. Only a function that needs the rest loads it.
+/// Makes the download that the page starts by itself wait for ever. Then only a function that needs the rest loads it.
 const WITHOUT_REST: &str = "const fetchIt = window.fetch;\
     window.fetch = (url, ...more) => `${url}`.endsWith('rest.wasm') ? new Promise(() => {}) : fetchIt(url, ...more);";
 

@@ -1,17 +1,17 @@
-//! The picture shows the arm where the kinematics say it is.
+//! The picture shows the marker of the tip where the kinematics say that the tip is.
 
 use browser_tests::{Page, Viewed};
 use kinematics::forward;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
-/// Poses of a run. `POSES` in the environment chooses another number.
+/// The number of poses. The environment variable `POSES` sets another number.
 const POSES: u32 = 60;
-/// The marker of the tip, and half the side of the square around it that is looked at, in pixels.
+/// The colour of the marker, and half the side of the square that is searched for it, in pixels.
 const MARKER: [u8; 3] = [214, 0, 140];
 const HALF: f64 = 14.0;
 
-/// The centre of the marker in the picture, in CSS pixels, near a place.
+/// The centre of the marker in CSS pixels; `None` if the marker is not near this place.
 fn marker(page: &mut Page, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
     let corner = [(x - HALF).floor(), (y - HALF).floor()];
     let picture = page.picture_of(corner, [2.0 * HALF + 1.0, 2.0 * HALF + 1.0]);
@@ -44,7 +44,7 @@ fn the_tip_is_drawn_within_2_pixels_of_the_kinematics() {
         page.slide_all(degrees);
         // The longest move takes two seconds at the usual speed.
         page.pass(3.0);
-        // A page that computes nothing has time for a picture.
+        // Pause the simulation, so that the page has time to draw.
         run_at(&mut page, 0);
         let [one, two, three, four, five, six, _] = page.measured();
         let tip = forward([one, two, three, four, five, six]).hand.tip;

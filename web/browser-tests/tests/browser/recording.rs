@@ -1,4 +1,4 @@
-//! Recordings: made in the page, checked and played by `sevenbot`, and the other way round.
+//! Recordings: made in the page and parsed by the library `sevenbot`, opened and played in the page; and parks.
 
 use std::path::{Path, PathBuf};
 

@@ -3,8 +3,8 @@
 use browser_tests::{Page, Viewed};
 use system_tests::wait::wait_until;
 
-/// A port of Web Serial whose bytes go through the server to `host-sim`: the browser of a test has no ports. Its line is slow:
-/// each reply comes 150 ms late.
+/// Imitates a port of Web Serial, because the browser of a test has no ports. The bytes go through the server to `host-sim`. The
+/// line is slow: each reply comes 150 ms late.
 const SERIAL_PORT: &str = "
     class Port {
       async open({ baudRate }) {
@@ -27,8 +27,8 @@ const SERIAL_PORT: &str = "
     }
     Object.defineProperty(navigator, 'serial', { value: { requestPort: async () => new Port() } });";
 
-/// Turns joint 1 by the keyboard, and waits until the arm has done so. On a slow line the page undoes some presses, because a
-/// target that it reads may be older than the last press.
+/// Turns joint 1 by the keyboard, waits until it has turned, and stops the arm. On a slow line the page undoes some presses,
+/// because a target that it reads may be older than the last press.
 fn check_it_moves(page: &mut Page) {
     let start = page.measured()[0];
     page.focus("#joint-1");

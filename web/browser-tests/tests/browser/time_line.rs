@@ -7,7 +7,7 @@ use system_tests::wait::wait_for;
 
 use super::programs::{LIT, SLOW, open_file, open_programs, open_text};
 
-/// Moves the slider, and waits until the time line says this.
+/// Moves the slider by a key, and waits until the text of the time line contains `says`.
 fn choose(page: &mut Page, key: &str, says: &str) {
     page.focus("#moment");
     page.key(key);
@@ -37,7 +37,7 @@ fn a_recording_is_looked_through_and_nothing_moves() {
     page.choose_file("#upload", &file);
     page.wait_for_text("#recording", "recorded: ");
     page.wait_until_ready();
-    // The arm has settled under its weight.
+    // Wait until the arm has settled under its weight.
     page.pass(1.0);
     let before = page.measured();
     page.click("[data-action=look]");
@@ -51,7 +51,7 @@ fn a_recording_is_looked_through_and_nothing_moves() {
     page.click("[data-action=close-time-line]");
     let is_hidden = "document.querySelector('#time-line').hidden";
     assert_eq!(page.evaluate(is_hidden), true);
-    // Another recording has another time line, and a move of the arm ends it.
+    // Another recording hides the time line, and so does a move of the arm.
     page.click("[data-action=look]");
     assert_eq!(page.evaluate(is_hidden), false);
     std::fs::write(&file, "7bot-recording 1\n0 90 115 65 90 90 90 80 0\n2 100 115 65 90 90 90 80 0\n")
@@ -97,7 +97,7 @@ fn a_preview_of_a_program_lights_its_blocks_and_moves_nothing() {
         });
         let angles: Vec<_> = before.into_iter().zip(page.measured()).collect();
         assert!(angles.iter().all(|(before, now)| (before - now).abs() < 0.3), "{angles:?}");
-        // Another program has another time line, wherever the slider is.
+        // Another program hides the time line, wherever the slider is.
         page.key("Home");
         open_text(&viewed, &mut page, SLOW, "speed=2");
         assert_eq!(page.evaluate("document.querySelector('#time-line').hidden"), true);
