@@ -6,14 +6,14 @@ use crate::message::{NotGiven, ToTeacher};
 
 /// The shortest time between two messages with the state of the class.
 const PERIOD: Duration = Duration::from_millis(100);
-/// The time between two of these messages while nothing changes: the remaining time of a lease still does.
+/// The time between two of these messages while nothing but the remaining time of a lease changes.
 const LONGEST_PERIOD: Duration = Duration::from_millis(500);
 
 #[derive(Debug, Default)]
 pub(crate) struct Desk {
     was_welcomed: bool,
     not_given: Option<NotGiven>,
-    /// The number of the last change that was shown, and the time of that message.
+    /// The last message with the state of the class: the number of the last change in it, and when it was sent.
     shown: Option<(u64, Instant)>,
 }
 

@@ -1,5 +1,5 @@
-//! Parses the messages to a pupil's tab. The page contains this parser and has to be small: the derived parser would take
-//! three times the code.
+//! Parses the messages to a pupil's tab. This parser is part of the page, which has to be small; the derived parser would
+//! take three times the code.
 
 use serde_json::{Map, Value};
 

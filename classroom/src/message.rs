@@ -99,7 +99,7 @@ pub struct Goals {
 pub enum StopOutcome {
     /// The arm holds.
     Holds,
-    /// The motors are off: there is nothing to stop.
+    /// The motors are off or damped: there is nothing to stop.
     Limp,
 }
 
@@ -109,7 +109,8 @@ pub enum StopOutcome {
 pub enum ToPupil {
     /// The tab is in the class.
     Welcome {
-        /// The name in the class. It differs from the requested name if another pupil has that one.
+        /// The name in the class: the requested name after [`crate::name::clean`], with a number if another pupil has this
+        /// name.
         name: String,
         /// A secret of this tab. With it the tab keeps its place in the class, and reaches the real arm during its lease.
         key: String,
@@ -273,11 +274,11 @@ pub enum Presence {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum TileStop {
-    /// It has not confirmed yet.
+    /// The stop is not confirmed yet.
     Asked,
     /// The arm holds.
     Holds,
-    /// The motors are off.
+    /// The motors are off or damped.
     Limp,
 }
 
@@ -308,7 +309,8 @@ pub struct StopNews {
 pub struct ArmTile {
     /// Does it answer?
     pub answers: bool,
-    /// Whether it has confirmed the last hold: after a stop for all, a stop by a pupil, or the end of a lease.
+    /// Whether it has confirmed the last hold: after a stop for all, a stop by a pupil, or the end of a lease. `None`
+    /// before the first hold.
     pub stop: Option<TileStop>,
     /// The number of the pupil who has it.
     pub holder: Option<u32>,

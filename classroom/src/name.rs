@@ -10,8 +10,8 @@ const fn is_invisible(character: char) -> bool {
         | '\u{fe00}'..='\u{fe0f}' | '\u{feff}' | '\u{ffa0}' | '\u{fff9}'..='\u{fffb}' | '\u{e0000}'..='\u{e007f}')
 }
 
-/// The name in a text: one line without spaces at its ends, cut after [`LONGEST_NAME`] characters. `None` if it has no letter
-/// and no digit.
+/// The name in a text: one line without invisible characters and without spaces at its ends, cut after [`LONGEST_NAME`]
+/// characters. `None` if it has no letter and no digit.
 ///
 /// ```
 /// use classroom::name::clean;

@@ -22,8 +22,9 @@ pub(crate) struct Pupil {
     lost: Instant,
     is_welcome_due: bool,
     report: Option<Report>,
-    /// When it was asked last, and when it answered last.
+    /// When the tab was asked last.
     asked: Instant,
+    /// When the tab answered last, or joined again.
     answered: Instant,
     is_ask_due: bool,
     waits_for_answer: bool,
@@ -53,7 +54,8 @@ impl Pupil {
         }
     }
 
-    /// Moves the pupil to a new connection. Returns the old connection if it is still open.
+    /// Moves the pupil to a new connection under this name, and makes all messages due again. Returns the old connection if
+    /// it is still open.
     pub(crate) fn rejoin(
         &mut self,
         now: Instant,
@@ -70,7 +72,7 @@ impl Pupil {
         before
     }
 
-    /// The connection has ended.
+    /// Notes that the connection has ended.
     pub(crate) const fn lose(&mut self, now: Instant) {
         (self.connection, self.lost) = (None, now);
     }
@@ -88,7 +90,7 @@ impl Pupil {
         }
     }
 
-    /// Makes a question due at once, which also tells who has the real arm.
+    /// Makes a [`ToPupil::Ask`] due at once. It also tells who has the real arm.
     pub(crate) const fn ask(&mut self) {
         self.is_ask_due = true;
     }

@@ -1,4 +1,4 @@
-//! The class's real arm: who has it, and whether it holds where it has to.
+//! The class's real arm: who has it, and whether it has confirmed the last hold.
 
 use protocol_core::time::Instant;
 
@@ -6,7 +6,7 @@ use crate::lease::Lease;
 use crate::message::{ArmTile, NotGiven, StopOutcome, TileStop};
 use crate::stop_all::PendingStop;
 
-/// The state of the real arm, as its caller sees it.
+/// The state of the real arm, as the caller of the class sees it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ArmNews {
     /// It answers.
@@ -17,7 +17,7 @@ pub struct ArmNews {
     pub is_holding: bool,
     /// It has confirmed the last hold.
     pub holds: bool,
-    /// Its motors were off when it confirmed the hold.
+    /// Its motors were off or damped when it confirmed the hold.
     pub is_limp: bool,
 }
 
@@ -66,7 +66,7 @@ impl RealArm {
         Some(lease.pupil)
     }
 
-    /// True if a hold has to start now. From then on it counts as in progress.
+    /// True if a hold has to start now. The hold then counts as in progress.
     pub(crate) fn take_hold(&mut self, now: Instant) -> bool {
         let ArmNews { may_hear, is_holding, .. } = self.news;
         // A new stop does not wait for the end of an older one.
@@ -78,7 +78,7 @@ impl RealArm {
         true
     }
 
-    /// Takes news of the arm. Returns whether they differ from the last ones, and whether they confirm the stop for all.
+    /// Takes news of the arm. Returns whether they differ from the previous news, and whether they confirm the stop for all.
     pub(crate) fn take_news(&mut self, news: ArmNews) -> (bool, bool) {
         let is_new = self.news != news;
         self.news = news;

@@ -58,7 +58,7 @@ impl Lesson {
         id
     }
 
-    /// A pupil who was welcomed, with the name and the key, and has answered the first question.
+    /// The connection and the name of a new pupil, whose tab was welcomed and has answered the first question.
     fn join(&mut self, name: &str) -> (ConnectionId, String) {
         let id = self.join_with(name, None);
         let Some(ToPupil::Welcome { name, .. }) = self.told(id) else { panic!("no welcome") };
@@ -86,7 +86,7 @@ impl Lesson {
             .collect()
     }
 
-    /// What the teacher's screen shows.
+    /// Lets 500 ms pass, and returns the state of the class that the teacher's screen then gets.
     fn shown(&mut self) -> ClassNews {
         self.pass(500);
         let class = |message| if let ToTeacher::Class(class) = message { Some(class) } else { None };
@@ -226,7 +226,7 @@ fn a_stop_goes_first_and_again_until_each_arm_has_confirmed() {
     lesson.say(leo, &stopped(1));
     let stop = lesson.shown().stop.unwrap();
     assert_eq!((stop.confirmed, stop.millis), (2, 600), "the first confirmation counts");
-    // The next one asks all of them again.
+    // The next stop asks all arms again.
     lesson.order(&FromTeacher::StopAll);
     assert_eq!(lesson.shown().stop.map(|stop| (stop.number, stop.confirmed)), Some((2, 0)));
 }

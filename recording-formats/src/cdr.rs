@@ -1,4 +1,4 @@
-//! Messages as bytes, in the encoding of ROS 2: CDR, with four bytes before it that name the byte order.
+//! Messages as bytes, in the encoding of ROS 2: a header of four bytes, which names the byte order, and CDR.
 //!
 //! ```text
 //!   00 01 00 00   CDR, little-endian, and options, which may give the number of padding bytes at the end
@@ -12,7 +12,7 @@ const LITTLE_ENDIAN: [u8; 2] = [0, 1];
 const BIG_ENDIAN: [u8; 2] = [0, 0];
 const NO_OPTIONS: [u8; 2] = [0, 0];
 
-/// The bytes of a message.
+/// Encodes a message in little-endian CDR, with its header.
 pub(crate) fn encode(message: &impl Serialize) -> Result<Vec<u8>, cdr_encoding::Error> {
     let mut bytes = [LITTLE_ENDIAN, NO_OPTIONS].concat();
     bytes.extend(cdr_encoding::to_vec::<_, LittleEndian>(message)?);
@@ -35,7 +35,7 @@ mod tests {
     use super::*;
     use crate::messages::{Header, JointState, Time};
 
-    /// Two joints at 1.5 s: each field in its line.
+    /// Two joints at 1.5 s. The lines: header, stamp, `frame_id`, names, number of positions, positions, velocities, efforts.
     const BYTES: &[&[u8]] = &[
         &[0, 1, 0, 0],
         &[1, 0, 0, 0, 0, 0x65, 0xCD, 0x1D],

@@ -25,7 +25,7 @@ pub(crate) fn parse(text: &str) -> Result<Recording, RecordingError> {
     Recording::parse(&format!("{head}\n{}", lines.replace(',', " ")))
 }
 
-/// The whole file.
+/// The recording as the text of a CSV file.
 pub(crate) fn text(recording: &Recording) -> String {
     let lines = recording.moments().map(|moment| {
         let line = moment.line(FileVersion::Hundredths);

@@ -18,13 +18,13 @@ use crate::messages::{JointState, RosMessage, Switch};
 use crate::read_error::{McapReadError, ReadError};
 use crate::topics::first_time;
 
-/// No recording of an arm has longer records. Without a bound, a damaged length would fill the memory.
+/// In bytes. No recording of an arm has longer records. Without a bound, a damaged length would fill the memory.
 const LONGEST_RECORD: usize = 64 * 1_024 * 1_024;
 /// The last words of topics with the states of joints, the preferred one first.
 const STATES: [&str; 2] = ["joint_states", "robot_joint_states"];
 /// The last word of the topic with the state of the pump.
 const VACUUM: &str = "vacuum";
-/// The resolution of the times of a recording. A moment that comes less than this after the one before is skipped.
+/// The resolution of the times of a recording. A moment that follows the previous one by less than this is skipped.
 const RESOLUTION: Duration = Duration::from_millis(1);
 
 /// Reads the recording, and passes each message on.
@@ -72,9 +72,9 @@ struct Tracks {
 
 #[derive(Default)]
 struct Track {
-    /// The time of the first moment, since 1970.
+    /// The stamp of the first moment, since 1970.
     start: Duration,
-    /// The time of the first moment in the recording.
+    /// The time that the recording gives to the first moment, from the metadata of the topic's channel.
     first_time: Duration,
     moments: Vec<Moment>,
 }
@@ -91,7 +91,7 @@ impl Tracks {
         }
         let Some(state) = cdr::decode::<JointState>(&message.data) else { return Ok(()) };
         let Some(positions) = positions(&state) else { return Ok(()) };
-        // Some programs leave the stamp at 0.
+        // Some programs leave the stamp at 0. Then the time at which the message was logged counts.
         let stamp = state.header.stamp.since_epoch().filter(|stamp| !stamp.is_zero());
         let time = stamp.unwrap_or(Duration::from_nanos(message.log_time));
         let track = self.by_topic.entry(message.channel.topic.clone()).or_default();

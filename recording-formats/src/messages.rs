@@ -1,4 +1,4 @@
-//! The messages of ROS 2 that a recording has: their fields, and their definitions as text for readers without ROS.
+//! The messages of ROS 2 in a recording: their fields, and their definitions as text for readers without ROS.
 //!
 //! The fields have the order of the published interfaces, because CDR does not encode names.
 
@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
-/// The line that begins the definition of a used interface.
+/// The separator and the name that stand before the definition of a used interface.
 macro_rules! interface {
     ($name:literal) => {
         concat!(
@@ -17,7 +17,7 @@ macro_rules! interface {
     };
 }
 
-/// The definitions that a header needs.
+/// The definitions of a header and of the interface that it uses.
 macro_rules! header {
     () => {
         concat!(
@@ -45,7 +45,7 @@ pub(crate) struct Time {
 }
 
 impl Time {
-    /// A time since 1970.
+    /// Converts a time since 1970. A time after 2038 does not fit, and its seconds become `i32::MAX`.
     pub(crate) fn new(time: Duration) -> Self {
         Self { sec: i32::try_from(time.as_secs()).unwrap_or(i32::MAX), nanosec: time.subsec_nanos() }
     }
@@ -84,7 +84,7 @@ impl RosMessage for JointState {
     );
 }
 
-/// `geometry_msgs/msg/TransformStamped`, with the fields of its parts in their order.
+/// `geometry_msgs/msg/TransformStamped`. Arrays stand for its nested messages, because CDR encodes both alike.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct Transform {
     /// The frame of the header is the parent.

@@ -1,6 +1,6 @@
 //! Reads a recording in any format. The first bytes determine the format.
 //!
-//! The input is bounded, so that a wrong path, such as a device, does not fill the memory.
+//! The length of a text is bounded, so that a wrong path, such as a device, does not fill the memory.
 
 use std::io::{self, Read};
 

@@ -14,16 +14,16 @@ pub enum ReadError {
     /// The source cannot be read.
     #[error(transparent)]
     Io(#[from] io::Error),
-    /// The text is too long for a recording.
+    /// The text has 512 MiB or more.
     #[error("this is longer than {LONGEST_TEXT} bytes: is it the right file?")]
     TooLong,
     /// The source is neither MCAP nor text in UTF-8.
     #[error("this is not text in UTF-8")]
     NotText,
-    /// The text is refused.
+    /// The text or CSV is not a valid recording.
     #[error(transparent)]
     Text(#[from] RecordingError),
-    /// The MCAP file has no recording of an arm.
+    /// The MCAP file is not a valid recording of one arm.
     #[error(transparent)]
     Mcap(#[from] McapReadError),
     /// The MCAP file is cut off or damaged.
@@ -36,7 +36,7 @@ pub enum ReadError {
     },
 }
 
-/// Why an MCAP file has no recording.
+/// Why a recording cannot be read from an MCAP file.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum McapReadError {
     /// No topic has the states of the joints.
@@ -57,16 +57,16 @@ pub enum McapReadError {
         joint: Joint,
         /// Its angle in degrees of the registers.
         degrees: f64,
-        /// The time in the file, since its first moment.
+        /// The time of the moment in the recording, in seconds.
         seconds: f64,
     },
-    /// A message is older than the one before.
+    /// A message is older than the previous one of its topic.
     #[error("after {seconds:.3} s the time goes back: are these two recordings?")]
     TimeGoesBack {
-        /// The time of the message before, since the first moment.
+        /// The time of the previous moment in the recording, in seconds.
         seconds: f64,
     },
-    /// The moments are refused.
+    /// The moments are not a valid recording.
     #[error(transparent)]
     Refused(#[from] RecordingError),
     /// The file is damaged before its first moment.

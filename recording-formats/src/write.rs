@@ -9,7 +9,7 @@ use crate::format::Format;
 use crate::telemetry::Telemetry;
 use crate::writer::{McapLayout, McapWriter};
 
-/// Writes a recording. In MCAP its time begins in 1970, because the text format has no date.
+/// Writes a recording. In MCAP its time begins in 1970, because a [`Recording`] has no date.
 ///
 /// # Errors
 /// The output cannot be written.

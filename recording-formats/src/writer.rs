@@ -38,7 +38,7 @@ const STALL_TORQUE: f64 = 2.0;
 pub enum McapLayout {
     /// Once a second, with an index: for a file.
     Indexed,
-    /// Each moment at once, without an index: for a program that reads while it is written.
+    /// Each moment at once, without an index: for a program that reads the file while it grows.
     Live,
 }
 
@@ -102,11 +102,11 @@ impl<W: Write> McapWriter<W> {
         })
     }
 
-    /// Adds a moment, not earlier than the one before. `at` is its time since 1970. The file has this time instead of
-    /// [`Moment::time`], which it keeps only for the first moment.
+    /// Adds a moment, not earlier than the previous one. `at` is its time since 1970. The file stores `at` instead of
+    /// [`Moment::time`]; of the latter it stores only the value of the first moment, as metadata.
     ///
     /// # Errors
-    /// The output cannot be written. The file then ends with the moments of [`McapWriter::written`].
+    /// The output cannot be written. The file then ends after the moments that [`McapWriter::written`] counts.
     pub fn add(&mut self, at: Duration, moment: &Moment, telemetry: &Telemetry) -> io::Result<()> {
         if self.vacuum.is_none() {
             self.first_time = moment.time;
@@ -149,7 +149,7 @@ impl<W: Write> McapWriter<W> {
         Ok(())
     }
 
-    /// Writes what does not change: the model, and the links that are fixed.
+    /// Publishes the constant messages: the model, and the transforms of the fixed links.
     fn describe(&mut self, at: Duration) -> io::Result<()> {
         self.publish(topics::DESCRIPTION, at, &Text { data: arm_model::urdf()? })?;
         let straight = [FineAngle::from(sevenbot::Angle::from_register(0)); 7];

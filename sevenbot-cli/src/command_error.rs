@@ -36,15 +36,15 @@ pub(crate) enum CommandError {
     NotTaken(NotTaken),
     /// The arm does not carry out the command, for these reasons.
     Problems(Vec<Problem>),
-    /// The arm may be moving, for this reason.
+    /// The arm may be moving, because this write failed.
     MayMove(WriteError),
-    /// The arguments do not fit the register, or an answer from the user is missing.
+    /// The arguments are invalid, or an answer from the user is missing.
     Usage(String),
-    /// No port was given, and none leads to an arm. The ports tried, with the reasons.
+    /// No port was given, and none leads to an arm. `tried` holds each port with the reason.
     NoArm { tried: Vec<(String, OpenError)> },
     /// No port was given, and several lead to an arm.
     SeveralArms { ports: Vec<String> },
-    /// The port does not lead to an arm.
+    /// The port cannot be opened, or does not lead to an arm.
     Open { port: String, error: OpenError },
     /// The port opens, but no arm answers at any baud rate.
     NoRate { port: String },

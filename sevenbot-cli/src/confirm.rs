@@ -1,4 +1,4 @@
-//! A question to the user before an action that cannot be undone.
+//! Asks the user for confirmation before an action.
 
 use std::io::{self, IsTerminal, Write};
 

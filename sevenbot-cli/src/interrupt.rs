@@ -18,12 +18,12 @@ static REQUESTS: AtomicU32 = AtomicU32::new(0);
 static MOVING: AtomicBool = AtomicBool::new(false);
 static HANDLER: Once = Once::new();
 
-/// Proof that Ctrl-C is caught.
+/// Shows that [`Interrupt::catch`] was called. If it could not set its handler, Ctrl-C still ends the program.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Interrupt(());
 
 impl Interrupt {
-    /// Catches Ctrl-C and the other signals that end a program. If that is not possible they end the program.
+    /// Catches Ctrl-C and the other signals that end a program. If the handler cannot be set, they end the program.
     pub(crate) fn catch() -> Self {
         MOVING.store(true, Ordering::SeqCst);
         HANDLER.call_once(|| {
@@ -57,7 +57,8 @@ impl Interrupt {
     }
 }
 
-/// Runs `work`, which may move the arm. After an interrupt the arm holds its position.
+/// Runs `work`, which may move the arm. After an interrupt, makes the arm hold its position, and fails with
+/// [`CommandError::Interrupted`]. After another failure, warns if the arm may be moving.
 pub(crate) fn hold_on_interrupt<T>(
     arm: &mut Arm,
     work: impl FnOnce(&mut Arm, Interrupt) -> Result<T, CommandError>,

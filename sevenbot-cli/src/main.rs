@@ -56,7 +56,7 @@ fn main() -> ExitCode {
         show_frames();
     }
     let printer = Printer::stdout(global.json);
-    // An empty SEVENBOT_PORT is the same as none.
+    // An empty SEVENBOT_PORT counts as not set.
     let port = global.port.filter(|port| !port.is_empty());
     let reply_timeout = Duration::from_millis(global.timeout.into());
     let options = ArmOptions { baud: global.baud, reply_timeout, map: global.map, ..ArmOptions::default() };

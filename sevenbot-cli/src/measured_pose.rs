@@ -26,7 +26,7 @@ impl MeasuredPose {
         Self { angles, step: AngleStep::WholeDegree }
     }
 
-    /// Reads hundredths of a degree if the arm has them, else from `positions`, in whole degrees.
+    /// Reads hundredths of a degree if the arm has them. Otherwise, and for joints without a measurement, takes `positions`.
     pub(crate) fn read(arm: &mut Arm, positions: [u8; 7]) -> Result<Self, Error> {
         let whole = Self::whole(positions);
         let Some(fine) = arm.fine_state_if_served()? else { return Ok(whole) };

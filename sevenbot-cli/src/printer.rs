@@ -50,7 +50,7 @@ impl Printer {
         !self.json && io::stdout().is_terminal()
     }
 
-    /// Prints a result.
+    /// Prints a result: with `--json` as one line of JSON, otherwise as text.
     pub(crate) fn print(&mut self, facts: &impl Printable) -> Result<(), CommandError> {
         if self.json {
             let line = serde_json::to_string(facts).map_err(io::Error::from)?;
@@ -61,7 +61,7 @@ impl Printer {
         Ok(self.stream.flush()?)
     }
 
-    /// Prints text unchanged, also with `--json`.
+    /// Prints text, also with `--json`. If the output is not a terminal, escape sequences are removed.
     pub(crate) fn print_raw(&mut self, text: &[u8]) -> Result<(), CommandError> {
         self.stream.write_all(text)?;
         Ok(self.stream.flush()?)

@@ -8,7 +8,7 @@ use clap::{Arg, Command, Error};
 use sevenbot::map::MAP;
 use sevenbot::names::{NameError, name_of};
 
-/// Parses an argument by this function.
+/// Parses an argument with this function, and offers the names of the table to the shell's completion.
 #[derive(Clone, Copy)]
 pub(crate) struct RegisterParser<T>(pub(crate) fn(&str) -> Result<T, NameError>);
 

@@ -12,13 +12,13 @@ fn random<const N: usize>() -> Option<[u8; N]> {
     getrandom::fill(&mut bytes).ok().map(|()| bytes)
 }
 
-/// 128 random bits; `None` if the operating system has no random numbers.
+/// 128 random bits in hexadecimal; `None` if the operating system has no random numbers.
 pub(crate) fn key() -> Option<String> {
     let bytes: [u8; 16] = random()?;
     Some(bytes.iter().map(|byte| format!("{byte:02x}")).collect())
 }
 
-/// 128 random bits.
+/// 128 random bits in hexadecimal.
 pub(crate) fn new_secret() -> Result<String, CommandError> {
     key().ok_or_else(no_random_numbers)
 }

@@ -19,7 +19,6 @@ pub(crate) struct Session {
     pub(crate) port: Option<String>,
     /// Baud rate, timeout and attempts.
     pub(crate) options: ArmOptions,
-    /// Prints results.
     pub(crate) printer: Printer,
     /// The file for all bytes to and from the arm.
     pub(crate) log: Option<PathBuf>,
@@ -44,7 +43,8 @@ impl Session {
         Ok(arm)
     }
 
-    /// As [`Self::connect`]. If a server of this user holds the port, connects through the server.
+    /// Opens the arm, without the warnings of [`Self::connect`]. If a server of this user holds the port, connects through
+    /// the server.
     pub(crate) fn connect_through_server(&self) -> Result<Arm, CommandError> {
         let port = self.port_name()?;
         match self.open(port.clone()) {
@@ -59,8 +59,8 @@ impl Session {
         }
     }
 
-    /// As [`Self::connect`], for a command that moves the arm. Also calls [`put_right`], and warns of servo alarms, which do
-    /// not end a move by themselves.
+    /// As [`Self::connect`], for a command that moves the arm. Also waits for the watchdog of a killed program, calls
+    /// [`put_right`], and warns of joint problems that a move of other joints does not report.
     pub(crate) fn connect_to_move(&self) -> Result<Arm, CommandError> {
         let mut arm = self.connect()?;
         arm.let_watchdog_act()?;
@@ -163,7 +163,7 @@ pub(crate) const fn running_simulators() -> Vec<String> {
     Vec::new()
 }
 
-/// The port of the only simulator; without one, the error.
+/// The port of the only simulator that runs; `no_arm` if none runs.
 fn simulator(running: Vec<String>, no_arm: CommandError) -> Result<String, CommandError> {
     match running.as_slice() {
         [] => Err(no_arm),

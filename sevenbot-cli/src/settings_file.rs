@@ -90,8 +90,8 @@ impl SettingsFile {
         }
     }
 
-    /// Applies the settings of the file to the registers `now`. Also returns the settings that the arm does not have, as
-    /// `serves` tells.
+    /// Applies the settings of the file to the registers `now`. Skips the settings for which `serves` is false, because the
+    /// arm does not have them, and returns them.
     pub(crate) fn applied_to(
         &self,
         path: &Path,
@@ -128,7 +128,7 @@ fn put(registers: &mut Snapshot, address: u8, byte: u8) {
     }
 }
 
-/// The value of a setting, from the registers to the file.
+/// Converts the register values of a setting to its value in the file.
 fn value(row: &Register, registers: &Snapshot) -> Value {
     let number = |address| Value::from(i64::from(row.range.decode_byte(registers.at(address))));
     match *row {
@@ -138,7 +138,7 @@ fn value(row: &Register, registers: &Snapshot) -> Value {
     }
 }
 
-/// The register values of a setting, from its value in the file.
+/// Converts the value of a setting in the file to its register values.
 fn bytes(row: &Register, value: &Value) -> Result<Vec<u8>, String> {
     let values = value.as_array().map_or(std::slice::from_ref(value), Vec::as_slice);
     if values.len() != usize::from(row.count) {

@@ -151,7 +151,7 @@ impl<'a> Panel<'a> {
         }
     }
 
-    /// The base from above, its top plate from the sides.
+    /// Draws the base: a circle in the view from above, its top plate as a line in the others.
     fn base(&self, out: &mut String) {
         let [x, y] = self.at([0.0, 0.0]);
         let radius = BASE_MM * PANEL / self.span;

@@ -33,7 +33,7 @@ impl Observer for ProgressWatch {
     fn progress(&mut self, stage: Stage, done: u64, total: u64) {
         let unit = stage.unit();
         if self.bar.as_ref().is_none_or(|(shown, _)| *shown != unit) {
-            // The old bar goes first, so that it leaves the screen.
+            // Drop the old bar first, so that it leaves the screen.
             self.bar = None;
             self.bar = Some((unit, Progress::new(total, unit)));
         }

@@ -12,10 +12,10 @@ use protocol_core::wire::{Deframer, FrameBuffer, Function, MAX_LENGTH, ToArm};
 
 use crate::hub::{ClientId, Event, Hub, WholeRequest};
 
-/// Bytes for the client beyond which reports are dropped: at 50 Hz, 1.4 s of reports of 14 bytes, or 0.4 s of the longest ones,
-/// 49 bytes.
+/// Reports are dropped while this many bytes or more wait for the client. At 50 Hz they are 1.4 s of reports of 14 bytes,
+/// or 0.4 s of the longest ones, 49 bytes.
 const MOST_REPORT_BYTES: usize = 1_024;
-/// Bytes for the client beyond which its reads wait.
+/// Reads of the client wait when its output could exceed this many bytes with the next reply.
 const MOST_BYTES: usize = 4_096;
 
 /// A client that sends and receives frames.

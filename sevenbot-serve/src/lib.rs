@@ -39,7 +39,7 @@
 //! let now = run(&mut hub, &mut [], 1_000);
 //! assert!(hub.has_arm());
 //!
-//! // Each program reads a register, and gets its own reply.
+//! // Each program reads registers, and gets its own reply.
 //! let mut clients = [FrameClient::connect(&mut hub, 115_200), FrameClient::connect(&mut hub, 115_200)];
 //! let requests = [[0xAA, 0x77, 3, 46, 7, 0x8B, 0xCE], [0xAA, 0x77, 3, 0, 1, 0x16, 0x6C]];
 //! for (client, request) in clients.iter_mut().zip(&requests) {

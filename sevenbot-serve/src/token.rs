@@ -1,4 +1,4 @@
-//! The secret that clients from other computers have to know.
+//! Compares the secret that clients from other computers have to know.
 
 /// Are both equal? The time of the comparison does not depend on how many bytes agree.
 pub(crate) fn is_equal(one: &[u8], other: &[u8]) -> bool {

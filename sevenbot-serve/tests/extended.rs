@@ -1,4 +1,4 @@
-//! Programs share an arm whose extended block one of them uses: reports (D26) and the watchdog (D24).
+//! Programs share an arm and use its extended block: reports (D26) and the watchdog (D24).
 
 #![allow(clippy::expect_used, clippy::indexing_slicing, clippy::unwrap_used)] // A panic is a failed test.
 

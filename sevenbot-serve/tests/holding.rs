@@ -1,4 +1,5 @@
-//! A hold of the server slows the joints down before it knows where they are, and restores their speeds; replies and requests are lost.
+//! A hold of the server slows the joints down before it knows where they are, and restores their speeds, also when replies
+//! and requests are lost.
 
 #![allow(clippy::expect_used, clippy::indexing_slicing, clippy::unwrap_used)] // A panic is a failed test.
 
@@ -217,7 +218,7 @@ fn a_speed_that_a_program_writes_during_a_hold_is_kept() {
     }
 }
 
-/// Program 0 streams to joint 1 with a point each 20 ms.
+/// Program 0 sets a set-point period of 20 ms, and sends one point for joint 1.
 fn streaming_world() -> World {
     let mut world = moving_world();
     let target = 16_000_u16.to_le_bytes();

@@ -49,7 +49,8 @@ fn ten_programs_lose_nothing_and_cross_nothing() {
     );
 }
 
-/// A request of a program: read these registers, or set its own speed register.
+/// What a program sends: a read of these registers, a write of its own speed register followed by a read of it, or bytes
+/// that are no frame.
 #[derive(Clone, Debug)]
 enum Step {
     Read(u8, u8),

@@ -52,7 +52,7 @@ impl World {
         }
     }
 
-    /// Takes whole frames.
+    /// Executes frames of the hub, which come whole, as the arm would.
     fn take(&mut self, mut frames: &[u8]) {
         while let [0xAA, 0x77, function, address, count, rest @ ..] = frames {
             let (start, count) = (usize::from(*address), usize::from(*count));

@@ -1,4 +1,4 @@
-//! While the arm is unplugged nothing is kept for it, and its programs are told.
+//! While the arm is unplugged or silent, nothing is kept for it, and its programs are told.
 
 #![allow(clippy::expect_used, clippy::indexing_slicing, clippy::unwrap_used)] // A panic is a failed test.
 

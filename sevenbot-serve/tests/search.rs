@@ -20,7 +20,7 @@ use tty_ports::pty::Pty;
 use tty_ports::symlink::Symlink;
 
 static START: LazyLock<std::time::Instant> = LazyLock::new(std::time::Instant::now);
-/// Holds the ports.
+/// The folder of the ports.
 static FOLDER: OnceLock<PathBuf> = OnceLock::new();
 
 fn port(name: &str) -> PathBuf {

@@ -162,7 +162,7 @@ fn each_program_reads_offsets_as_it_writes_them() {
     }
 }
 
-/// M4: only an accepted write of map 2.1 stops the reports of map 2.2. The arm refuses these.
+/// M4: only an accepted write of map 2.1 stops the reports of map 2.2. The arm refuses the writes of this test.
 #[test]
 fn a_write_that_the_arm_refuses_stops_no_reports() {
     let far = [0x05, 0xF4, 0x04, 0xB9, 0x04, 0x32, 0x80, 0x80, 0x7F];
@@ -205,7 +205,7 @@ fn a_write_that_the_lock_makes_harmless_stops_reports() {
     assert_eq!(world.arm.registers().read(FRAMES_REFUSED.address, 1), [0]);
 }
 
-/// M5 and M6: register 20 holds for each program until its own first write, however often others write.
+/// M5 and M6: register 20 decides for each program until its own first write, however often others write.
 #[test]
 fn before_its_first_write_a_program_reads_offsets_as_register_20_says() {
     let mut world = World::new(2);

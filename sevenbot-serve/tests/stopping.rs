@@ -37,8 +37,8 @@ fn positions(world: &mut World) -> [i32; 7] {
     look(world).1
 }
 
-/// A program stops the arm as `sevenbot stop` does: it reads where the arm is, and writes that. Returns how long the write took
-/// to the arm, and what it wrote.
+/// A program stops the arm as `sevenbot stop` does: it reads the positions, and writes them as targets. Returns the time
+/// until the write reached the arm, and the targets.
 fn stop(world: &mut World, program: usize) -> (Duration, Vec<u8>) {
     world.round_trip(program, &read(FINE_TARGET.address, 28));
     let (_, values) = world.take(program).pop().expect("a reply");
@@ -52,7 +52,7 @@ fn stop(world: &mut World, program: usize) -> (Duration, Vec<u8>) {
     (world.now - start, held)
 }
 
-/// The greatest distance of a joint from its target in these fine targets, in hundredths of a degree.
+/// The greatest distance between the position of a joint and its fine target, in hundredths of a degree.
 fn farthest(targets: &[u8], positions: [i32; 7]) -> i32 {
     let targets = targets.chunks(2).map(|word| i32::from(u16::from_le_bytes([word[0], word[1]])));
     targets.zip(positions).map(|(target, position)| (target - position).abs()).max().unwrap()
@@ -201,7 +201,8 @@ fn a_command_to_the_server_stops_the_arm_and_ends_streams() {
     assert_eq!(world.arm.registers().get(TARGET_POSITION.address), held);
 }
 
-/// The weight draws the joints off their targets. Holds at the positions would let the arm sink by as much each time.
+/// The weight draws the joints off their targets. If a hold wrote the positions as targets, the arm would sink by this
+/// distance each time.
 #[test]
 fn d24_an_arm_that_is_held_again_and_again_does_not_sink() {
     let mut world = World::new(3);
@@ -225,7 +226,7 @@ fn d24_an_arm_that_is_held_again_and_again_does_not_sink() {
     assert!(moved <= Some(10), "moved by {moved:?} hundredths");
 }
 
-/// The hold reads where the arm is, and writes that. A program's stop comes at each moment meanwhile.
+/// A hold reads the positions, and writes them as targets. In between, at each moment in turn, a program stops the arm.
 #[test]
 fn a_hold_under_way_does_not_overwrite_a_stop_that_comes_meanwhile() {
     let mut world = World::new(3);

@@ -1,14 +1,14 @@
-//! Counts the clients of ports, which are the programs that have a terminal open, by inotify.
+//! Uses inotify to count the clients of each port. A client is a program that has the terminal of the port open.
 //!
-//! The program itself keeps its ports open, so the kernel does not report that the last client has closed a port.
-//! inotify reports each open and each close. But it merges equal reports that follow each other unread: two opens in a
-//! row would count as one. The directory of the terminals is watched too, which puts a report of the directory between
-//! any two of a terminal, so that none are merged.
+//! The program itself keeps its ports open, so the kernel does not report that the last client has closed a port. inotify
+//! reports each open and each close. But it merges equal reports that follow each other unread: two opens in a row would
+//! count as one. So the directory of the terminals is watched too. Each report of a terminal is then followed by a report
+//! of the directory, and no reports of the terminal are merged.
 //!
 //! The queue of reports is bounded, and after an overflow the counts are wrong. Then the open files of all processes are
 //! searched instead, until no client has the port open and counting starts again.
 //!
-//! All ports share one inotify instance, because the default limit of a user is 128.
+//! All ports share one inotify instance, because a user may have only 128 instances by default.
 
 use std::collections::HashMap;
 use std::io;
@@ -46,7 +46,7 @@ struct WatchedPort {
     count: usize,
     /// Reports were lost since the port had no client.
     has_lost_count: bool,
-    /// The count has to be checked.
+    /// The count may be wrong until [`WatchedPort::recount`].
     is_stale: bool,
     news: PortNews,
 }
@@ -70,7 +70,7 @@ impl Clients {
         Ok(Self { inotify, ports: HashMap::new(), has_changed: false })
     }
 
-    /// Counts the clients of a terminal from now on. At this time, only this program may have it open.
+    /// Counts the clients of a terminal from now on. The caller makes sure that no other program has it open yet.
     ///
     /// # Errors
     /// inotify refuses to watch the terminal or its directory.
@@ -103,7 +103,7 @@ impl Clients {
         self.ports.get_mut(&port.0).map(|port| take(&mut port.news)).unwrap_or_default()
     }
 
-    /// Would [`Clients::take_news`] return something?
+    /// True if [`Clients::take_news`] would return an event.
     #[must_use]
     pub fn has_news(&self, port: ClientWatch) -> bool {
         self.ports.get(&port.0).is_some_and(|port| port.news != PortNews::default())
@@ -193,7 +193,7 @@ mod tests {
     use super::*;
     use crate::pty::Pty;
 
-    /// How many reports the kernel keeps.
+    /// The number of reports that the kernel keeps for one inotify instance.
     fn limit() -> usize {
         let limit = std::fs::read_to_string("/proc/sys/fs/inotify/max_queued_events").unwrap();
         limit.trim().parse().unwrap()
@@ -212,7 +212,7 @@ mod tests {
             clients.update().unwrap();
             pty.update_clients(&mut clients).unwrap();
             assert!(pty.has_client());
-            // Each opens and closes, and each report is followed by one of the directory: four reports.
+            // Each iteration causes four reports: an open and a close, each followed by a report of the directory.
             (0..limit() / 4 + 100).for_each(|_| drop(open(&pty)));
             let last = stays.then(|| open(&pty));
             drop(first);

@@ -1,5 +1,5 @@
-//! Finds processes that have a terminal open, in the open files of all processes. This is slow, so it is used only after
-//! inotify has lost reports. Linux only.
+//! Checks whether another process has a terminal open, by a search in the open files of all processes. The search is slow,
+//! so it is used only after inotify has lost reports. Linux only.
 
 use std::ffi::OsStr;
 use std::fs;
@@ -8,7 +8,7 @@ use std::path::Path;
 /// Does a file descriptor besides the program's own refer to `terminal`? True if the system does not show open files.
 pub(crate) fn has_other_holder(terminal: &Path) -> bool {
     let Ok(processes) = fs::read_dir("/proc") else { return true };
-    // "self" is a link to one of the other entries.
+    // Skip entries such as "self", which is a link to a numbered one.
     let is_number = |name: &OsStr| name.as_encoded_bytes().iter().all(u8::is_ascii_digit);
     let processes = processes.flatten().filter(|entry| is_number(&entry.file_name()));
     let folders = processes.map(|process| process.path().join("fd"));

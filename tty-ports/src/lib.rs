@@ -1,4 +1,4 @@
-//! Terminals without blocking: pseudo-terminals that a program offers to others, and serial ports that it opens.
+//! Non-blocking terminals: pseudo-terminals that a program offers to others, and serial ports that it opens.
 //!
 //! Linux only, because inotify reports when clients open and close a pseudo-terminal.
 //!

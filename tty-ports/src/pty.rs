@@ -1,12 +1,12 @@
-//! The port: a pseudo-terminal that any serial client can open.
+//! The port: a pseudo-terminal that other programs of this user open like a serial port.
 //!
 //! ```text
-//!   program ◀──▶ master ═══ kernel ═══ terminal (/dev/pts/N) ◀──▶ client, and the one after it
+//!   program ◀──▶ master ═══ kernel ═══ terminal (/dev/pts/N) ◀──▶ client, then the next client
 //! ```
 //!
-//! The program also keeps the terminal open. So the port and its raw mode stay without a client. Before the next client
-//! comes, the program resets what a client left: an exclusive lock, another terminal mode, unread bytes. There are no
-//! frames and no time here.
+//! The program also keeps the terminal open. So the port and its raw mode persist while there is no client. When the last
+//! client has closed the port, the program resets what this client left: an exclusive lock, another terminal mode, unread
+//! answers. This module knows no frames and no time.
 
 use std::ffi::OsStr;
 use std::io;
@@ -41,7 +41,7 @@ impl Pty {
     /// them.
     ///
     /// # Errors
-    /// The system has none left, or refuses.
+    /// The system has no pseudo-terminal left, or refuses to open one.
     pub fn open(clients: Option<&mut Clients>) -> io::Result<Self> {
         let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC)?;
         grantpt(&master)?;
@@ -56,19 +56,19 @@ impl Pty {
         Ok(Self { master, terminal, path, watch, client_count: 0 })
     }
 
-    /// A port whose every read and write fails.
+    /// A port on which every read and every write fails.
     ///
     /// # Errors
     /// See [`Pty::open`].
     #[cfg(feature = "test-support")]
     pub fn broken() -> io::Result<Self> {
         let mut port = Self::open(None)?;
-        // The end of a pipe that cannot be read.
+        // The write end of a pipe whose read end is closed.
         port.master = io::pipe()?.1.into();
         Ok(port)
     }
 
-    /// Warns that clients are not reported, and of the consequence.
+    /// Logs a warning: the clients of a port cannot be counted, so its output piles up unread.
     pub fn warn_of(error: &io::Error) {
         warn!("cannot see clients come and go ({error}): output piles up unread");
     }
@@ -85,7 +85,7 @@ impl Pty {
         self.master.as_fd()
     }
 
-    /// Reads bytes of clients. 0 means that there are none.
+    /// Reads bytes that clients have written. 0 means that no bytes are waiting.
     ///
     /// # Errors
     /// The pseudo-terminal failed.
@@ -115,7 +115,7 @@ impl Pty {
         self.watch.is_none() || self.client_count > 0
     }
 
-    /// Did clients open or close the port since the last call of [`Pty::update_clients`]?
+    /// Did a client open the port, or the last client close it, since the last call of [`Pty::update_clients`]?
     #[must_use]
     pub fn has_news(&self, clients: &Clients) -> bool {
         self.watch.is_some_and(|watch| clients.has_news(watch))
@@ -141,11 +141,11 @@ impl Pty {
         Ok(news.was_emptied)
     }
 
-    /// Drops unread answers and the exclusive lock of the last client; its unread *requests* stay. The terminal mode is
-    /// reset only if no new client is there, which may have set it.
+    /// Drops unread answers and the exclusive lock of the last client; its unread *requests* stay. Resets the terminal mode
+    /// only if no new client has the port open, because a new client may have set the mode.
     fn reset(&self, is_unused: bool) -> io::Result<()> {
         tcflush(&self.terminal, QueueSelector::IFlush)?;
-        // Output that a client has suspended (XOFF) stays so for the next one.
+        // Resume output that the last client has suspended (XOFF). Otherwise it stays suspended for the next client.
         tcflow(&self.terminal, Action::OOn)?;
         ioctl_tiocnxcl(&self.terminal)?;
         let mut mode = tcgetattr(&self.terminal)?;
@@ -208,7 +208,7 @@ mod tests {
         OpenOptions::new().read(true).write(true).open(pty.path()).unwrap()
     }
 
-    /// A kernel thread passes the bytes to the master, which takes some time.
+    /// Reads `length` bytes, and waits up to 10 s for them: a kernel thread passes them to the master with a delay.
     fn read_exactly(pty: &Pty, length: usize) -> Vec<u8> {
         let mut bytes = Vec::new();
         for _ in 0..10_000 {
@@ -314,7 +314,7 @@ mod tests {
         assert_eq!(read_exactly(&pty, 7), b"request");
     }
 
-    /// TIOCGEXCL has no safe wrapper.
+    /// Does the terminal have an exclusive lock? rustix has no safe wrapper of TIOCGEXCL.
     #[allow(unsafe_code)]
     fn is_exclusive(terminal: &OwnedFd) -> bool {
         use rustix::ioctl::{Getter, ioctl, opcode};

@@ -1,7 +1,7 @@
 //! A serial port, most often of a USB adapter.
 //!
-//! The port is opened for this process only, in raw mode, at any baud rate. If the adapter has a latency timer, it is set
-//! to its minimum.
+//! The port is opened for this process only, in raw mode, at any baud rate. If the adapter has a latency timer, the program
+//! tries to set it to its minimum.
 
 use std::fs;
 use std::io;
@@ -21,7 +21,7 @@ const SHORTEST_LATENCY_MS: u32 = 1;
 /// Why the port cannot be used. Each message says what to do.
 #[derive(Debug, thiserror::Error)]
 pub enum SerialError {
-    /// The path does not exist.
+    /// There is no device at this path.
     #[error("{}: there is no such port: plug the cable in; ports that are there: {}", path.display(), ports())]
     Absent {
         /// The port.
@@ -32,7 +32,7 @@ pub enum SerialError {
     Forbidden {
         /// The port.
         path: PathBuf,
-        /// The group that has the permission.
+        /// The number of the group that owns the port; 0 if it cannot be read.
         group: u32,
     },
     /// Another program has it.
@@ -78,7 +78,8 @@ pub struct LatencyTimer {
 }
 
 impl Serial {
-    /// Opens a port for this process only.
+    /// Opens a port for this process only, in raw mode, at `baud` bits per second. Discards the bytes that are waiting, and
+    /// tries to shorten the latency timer.
     ///
     /// # Errors
     /// See [`SerialError`].
@@ -102,7 +103,7 @@ impl Serial {
         self.latency
     }
 
-    /// Reads bytes that have arrived. 0 means that there are none.
+    /// Reads bytes that have arrived. 0 means that no bytes are waiting.
     ///
     /// # Errors
     /// The adapter was unplugged, or the operating system failed.
@@ -175,8 +176,8 @@ fn ports() -> String {
     if ports.is_empty() { "none".to_owned() } else { ports.join(" ") }
 }
 
-/// Sets the latency timer of an FTDI chip, 16 ms by default. The kernel shows it in a file, which only root can write on
-/// most systems.
+/// Tries to set the latency timer of an FTDI chip (16 ms by default) to its minimum. On most systems only root may write
+/// the kernel's file of the timer. `None` if there is no such file.
 fn shorten_latency(path: &Path) -> Option<LatencyTimer> {
     let device = fs::canonicalize(path).ok()?;
     let file = Path::new("/sys/bus/usb-serial/devices").join(device.file_name()?).join("latency_timer");

@@ -1,9 +1,9 @@
 //! A stable name for the port: a symbolic link that exists while the program runs.
 //!
-//! A program that was killed leaves its link. The next program may replace this link, but never the link of a running program,
-//! nor a link that the user made. The kernel reuses the numbers of pseudo-terminals, so the existence of one does not show that
-//! the program of the link still runs. Two things do: a lock that the kernel frees when the process ends, and whether the
-//! pseudo-terminal is older than the link.
+//! A program that was killed leaves its link. The next program may replace this link, but never the link of a running
+//! program, nor a link that the user made. The kernel reuses the numbers of pseudo-terminals. So a link whose target exists
+//! may still be a link of a killed program. Two facts distinguish the link of a running program. The program holds a lock,
+//! which the kernel frees when the process ends. And its pseudo-terminal is older than its link.
 
 use std::fs::{self, Metadata};
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -22,7 +22,8 @@ pub enum SymlinkError {
     /// The path exists and is not a symbolic link.
     #[error("{}: that is no symbolic link, so it is not replaced: remove it, or choose another path", .0.display())]
     Taken(PathBuf),
-    /// The path is a symbolic link to something that exists: perhaps to the port of another program.
+    /// The path is a symbolic link of a running program, or a link to something that exists: perhaps to the port of another
+    /// program.
     #[error(
         "{}: that link leads to {}, which exists, so it is not replaced: end the program that serves this port, remove \
          the link, or choose another path",
@@ -34,8 +35,8 @@ pub enum SymlinkError {
         /// Where the link leads.
         target: PathBuf,
     },
-    /// The path is a symbolic link to something that does not exist and is not a pseudo-terminal. No program of this kind made
-    /// it.
+    /// The path is a symbolic link to something that does not exist and is not a pseudo-terminal. So [`Symlink`] did not
+    /// create it.
     #[error(
         "{}: that link to {} is not one to a port of a simulator, so it is not replaced: remove it, or choose another path",
         path.display(), target.display()
@@ -67,9 +68,9 @@ pub struct Symlink {
 /// The lock of a path: an abstract socket, which has no file and which the kernel closes with its process.
 #[derive(Debug)]
 struct LinkLock {
-    /// Another program, or another link of this one, has it.
+    /// Another program, or another [`Symlink`] of this program, holds the lock.
     is_taken: bool,
-    /// `None` if it is taken, or if the system gives no such socket.
+    /// `None` if the lock is taken, or if the system refuses to create such a socket.
     _socket: Option<UnixListener>,
 }
 
@@ -81,7 +82,7 @@ impl LinkLock {
     }
 }
 
-/// The name of the lock: the directory, and a hash of the name in it.
+/// The name of the lock: device and inode of the directory, and a hash of the link's name in it.
 fn lock_address(path: &Path) -> io::Result<SocketAddr> {
     let parent = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let directory = fs::metadata(parent)?;
@@ -142,12 +143,12 @@ fn check_left_behind(path: &Path, target: &Path, link: &Metadata) -> Result<(), 
         Err(error) if error.kind() == io::ErrorKind::NotFound && is_terminal => Ok(()),
         Err(error) if error.kind() == io::ErrorKind::NotFound => Err(SymlinkError::Foreign { path, target }),
         Ok(terminal) if is_terminal && changed(&terminal) > changed(link) => Ok(()),
-        // A target that cannot be looked at counts as one that exists.
+        // A target that cannot be examined counts as one that exists.
         _ => Err(SymlinkError::InUse { path, target }),
     }
 }
 
-/// The time at which a file was created or last got its mode.
+/// The time of the last change of a file's inode (ctime), such as its creation or a change of its mode.
 fn changed(metadata: &Metadata) -> (i64, i64) {
     (metadata.ctime(), metadata.ctime_nsec())
 }

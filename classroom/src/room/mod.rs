@@ -53,7 +53,8 @@ enum Connection {
     },
     Pupil(u32),
     Teacher(Desk),
-    /// The reason for the refusal; `None` once it was sent. Then the connection is closed.
+    /// The reason for the refusal; `None` once it was sent. Then [`Classroom::is_over`] tells the caller to close the
+    /// connection.
     Refused(Option<Refused>),
 }
 
@@ -63,7 +64,7 @@ enum Refused {
     Teacher,
 }
 
-/// A class.
+/// The state of a class.
 #[derive(Debug)]
 pub struct Classroom {
     info: ClassInfo,
@@ -96,7 +97,8 @@ impl Classroom {
         }
     }
 
-    /// A tab of a pupil connects. `key` is a new secret: a tab that knows it belongs to this pupil.
+    /// Adds the connection of a pupil's tab; refuses it if [`MOST_PUPILS`] tabs are connected. `key` is a new secret: a tab
+    /// that knows it belongs to this pupil.
     pub fn open_pupil(&mut self, now: Instant, key: String) -> ConnectionId {
         let pupils = |connection: &&Connection| {
             matches!(connection, Connection::Stranger { .. } | Connection::Pupil(_))
@@ -106,7 +108,7 @@ impl Classroom {
         self.open(if is_full { refused } else { Connection::Stranger { key, since: now } })
     }
 
-    /// A teacher's screen connects.
+    /// Adds the connection of a teacher's screen. Refuses it if there are too many.
     pub fn open_teacher(&mut self) -> ConnectionId {
         let teachers = |connection: &&Connection| matches!(connection, Connection::Teacher(_));
         let is_full = self.connections.values().filter(teachers).count() >= MOST_TEACHERS;
@@ -121,7 +123,7 @@ impl Classroom {
         id
     }
 
-    /// A connection has ended.
+    /// Notes that a connection has ended. A pupil who has the real arm loses it.
     pub fn close(&mut self, now: Instant, id: ConnectionId) {
         let Some(Connection::Pupil(number)) = self.connections.remove(&id) else { return };
         if let Some(pupil) = self.pupils.get_mut(&number) {
@@ -223,7 +225,7 @@ impl Classroom {
         self.pupils.retain(is_kept);
     }
 
-    /// Takes news of the real arm.
+    /// Takes the state of the real arm. A state that equals the last one changes nothing.
     pub fn arm_news(&mut self, now: Instant, news: ArmNews) {
         let Some(arm) = &mut self.arm else { return };
         let (is_new, confirms_stop) = arm.take_news(news);
@@ -238,7 +240,7 @@ impl Classroom {
         self.arm.as_mut().is_some_and(|arm| arm.take_hold(now))
     }
 
-    /// The present lease of the real arm.
+    /// The present lease of the real arm; `None` if no pupil has it.
     #[must_use]
     pub fn lease(&self) -> Option<LeaseId> {
         self.lease_now().map(|lease| LeaseId(lease.number))

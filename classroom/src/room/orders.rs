@@ -1,4 +1,4 @@
-//! What pupils and the teacher want: stops, messages, and who has the real arm.
+//! Carries out the messages of pupils and teachers: stops, texts, and who has the real arm.
 
 use protocol_core::time::Instant;
 
@@ -82,7 +82,7 @@ impl Classroom {
         self.change += 1;
     }
 
-    /// Makes a question to every pupil due at once, which tells who has the arm.
+    /// Makes a question to every pupil due at once. The question tells who has the arm.
     fn ask_all(&mut self) {
         self.pupils.values_mut().for_each(Pupil::ask);
     }

@@ -8,7 +8,7 @@ use crate::connection::ConnectionId;
 use crate::message::{ClassNews, LentArm, StopNews, ToPupil, ToTeacher};
 
 impl Classroom {
-    /// The connections that have a message.
+    /// The connections for which a message is due.
     pub fn ready(&self, now: Instant) -> impl Iterator<Item = ConnectionId> {
         let has_message = move |connection: &Connection| match connection {
             Connection::Stranger { .. } => false,

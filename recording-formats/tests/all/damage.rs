@@ -1,4 +1,5 @@
-//! MCAP files that are cut off, as a kill or a full disk leaves them, and files with wrong bytes.
+//! MCAP files that are cut off, as a kill or a full disk leaves them, files with wrong bytes, and files that are not a
+//! recording of one arm.
 
 use recording_formats::{Format, McapLayout, McapReadError, ReadError, convert, read};
 use sevenbot::recording::{Moment, Recording};

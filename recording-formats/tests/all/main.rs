@@ -12,7 +12,7 @@ use recording_formats::{McapLayout, McapWriter, Telemetry};
 use sevenbot::FineAngle;
 use sevenbot::recording::{Moment, Recording};
 
-/// When the recordings of the tests begin, since 1970.
+/// The time since 1970 at which the recordings of the tests begin.
 const START: Duration = Duration::from_secs(1_700_000_000);
 
 /// This many moments of random angles, 20 ms apart.

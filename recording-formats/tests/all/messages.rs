@@ -11,7 +11,8 @@ use sevenbot::{Angle, FineAngle};
 
 use crate::START;
 
-/// An arm in the straight pose with joint 1 at 180 degrees, its targets and its motion.
+/// A file with two moments of an arm in the straight pose with joint 1 at 180 degrees, its targets and motion, and one
+/// diagnosis.
 fn file() -> Vec<u8> {
     let pose = [180, 90, 65, 90, 90, 90, 60].map(|degrees| FineAngle::from(Angle::from_register(degrees)));
     let telemetry = Telemetry {
@@ -68,14 +69,14 @@ fn topics_and_interfaces_are_those_of_the_node() {
     assert_eq!(topics, expected.map(|(topic, name, count)| (topic.to_owned(), name.to_owned(), count)));
 }
 
-/// The fields of a message, behind the four bytes that name the byte order.
+/// The fields of a message, after the four bytes that name the byte order.
 struct Fields<'a> {
     bytes: &'a [u8],
     place: usize,
 }
 
 impl Fields<'_> {
-    /// The next number of this many bytes, which begins at a multiple of them.
+    /// The next number of `N` bytes, aligned to a multiple of `N`.
     fn take<const N: usize>(&mut self) -> [u8; N] {
         let begin = self.place.next_multiple_of(N);
         self.place = begin + N;

@@ -1,4 +1,4 @@
-//! What goes into a format comes out of it.
+//! A recording that is written in any format and read back is unchanged. Input that is not a recording is refused.
 
 use recording_formats::{Format, McapLayout, ReadError, convert, read, write};
 use sevenbot::recording::{Recording, RecordingError};

@@ -73,8 +73,8 @@ pub(crate) fn backup(session: &mut Session, args: &BackupArgs) -> Result<(), Com
     Ok(())
 }
 
-/// Replaces an old file only when the new one is complete. With `may_replace`, anything but a regular file, such as a pipe or a
-/// link, is written to directly.
+/// Writes a file. Without `may_replace` it must not exist. With it, an old regular file is replaced when the new one is
+/// complete, and anything else, such as a pipe or a link, is written to directly.
 fn write_whole(path: &Path, text: &str, may_replace: bool) -> Result<(), CommandError> {
     let is_special = fs::symlink_metadata(path).is_ok_and(|there| !there.is_file());
     if may_replace && is_special {
@@ -115,7 +115,7 @@ pub(crate) fn restore(session: &mut Session, args: &RestoreArgs) -> Result<(), C
     Ok(())
 }
 
-/// Fails if the file is from another arm, unless that is wanted: offsets belong to one arm.
+/// Fails if the file is from another arm, unless `may_differ`: offsets belong to one arm.
 fn check_chip(arm: &Arm, file: &SettingsFile, may_differ: bool) -> Result<(), CommandError> {
     let chip = arm.identity().chip_name();
     if file.chip_id == chip || may_differ {

@@ -149,7 +149,8 @@ fn config(
     Ok((config, pages))
 }
 
-/// The addresses at which other computers reach the server: `listen`, or all IPv4 addresses of this computer if it is 0.0.0.0.
+/// The addresses at which other computers reach the server: `listen`, or if that is unspecified (0.0.0.0), the IPv4
+/// addresses of this computer without loopback and link-local ones.
 fn hosts(listen: IpAddr) -> Vec<IpAddr> {
     if !listen.is_unspecified() {
         return vec![listen];
@@ -165,7 +166,7 @@ fn hosts(listen: IpAddr) -> Vec<IpAddr> {
 }
 
 impl Pages {
-    /// Prints the addresses, and opens the teacher's screen.
+    /// Prints the addresses, and opens the teacher's screen in a browser unless `--no-open` is given.
     fn announce(self, session: &mut Session, args: &ClassArgs, server: &Server) -> Result<(), CommandError> {
         let page = |host: IpAddr| server.class_page(host).unwrap_or_default();
         let own = if args.listen.is_unspecified() { IpAddr::V4(Ipv4Addr::LOCALHOST) } else { args.listen };

@@ -1,4 +1,4 @@
-//! `convert`: a recording in another format.
+//! `convert`: converts a recording to another format.
 
 use std::io::{self, Write};
 use std::path::PathBuf;

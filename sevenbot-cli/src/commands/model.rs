@@ -66,7 +66,7 @@ pub(crate) fn run(args: &ModelArgs) -> Result<(), CommandError> {
         let advice = "a terminal cannot show glb: add --out FILE, or redirect the output";
         return Err(CommandError::Usage(advice.to_owned()));
     }
-    // Not through the printer, which removes escape sequences: glb is binary.
+    // Do not use the printer: it removes escape sequences, and glb is binary.
     stdout.write_all(&bytes)?;
     Ok(stdout.flush()?)
 }

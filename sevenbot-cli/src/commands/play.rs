@@ -104,7 +104,7 @@ pub(crate) fn run(session: &mut Session, args: &PlayArgs) -> Result<(), CommandE
     session.printer.print(&Played { times: player.played(), seconds })
 }
 
-/// Makes the arm follow, once, a recording that was planned from its present targets. Restores its speeds and times afterwards.
+/// Plays, once, a recording that was planned from the arm's present targets. Then restores the arm's speeds and times.
 pub(super) fn follow(arm: &mut Arm, recording: &Recording) -> Result<(), CommandError> {
     arm.driven_joints()?;
     play(&mut Player::new(recording, 1.0).with_approach(ApproachRule::Slowly), arm, 1)

@@ -1,4 +1,4 @@
-//! `plot`: the way of the tip in a recording, in space.
+//! `plot`: draws the way of the tip in a recording as SVG.
 
 use std::path::PathBuf;
 

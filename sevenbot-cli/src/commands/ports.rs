@@ -1,4 +1,4 @@
-//! `ports`: lists the serial ports of this machine, and the arms behind them.
+//! `ports`: lists serial ports, servers and simulators, and the arms behind them; remembers and forgets names of the network.
 
 use std::fs;
 use std::io::{self, Write};

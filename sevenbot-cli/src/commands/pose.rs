@@ -93,7 +93,7 @@ impl PaceArgs {
         Pace { speed: self.speed, time: self.time }
     }
 
-    /// Are the speed or the duration for this move only? Only a command that waits can put the old values back.
+    /// Does the speed or the duration apply to this move only? Only a command that waits can restore the old values.
     const fn is_for_this_move(&self) -> bool {
         self.wait && (self.speed.is_some() || self.time.is_some())
     }
@@ -209,7 +209,7 @@ fn move_to(session: &mut Session, goals: &[PoseArg], pace: &PaceArgs) -> Result<
     }
 }
 
-/// Starts the move, and with --wait waits for its end. Returns the positions in whole degrees.
+/// Starts the move, and with --wait waits for its end. Returns the positions in whole degrees; `None` without --wait.
 fn go(
     arm: &mut Arm,
     targets: FineTargets,

@@ -48,7 +48,7 @@ fn all_known(health: &Health) -> Result<(), CommandError> {
     if unknown.is_empty() { Ok(()) } else { Err(CommandError::Problems(unknown)) }
 }
 
-/// The position of an arm.
+/// The position of the tip, for printing.
 #[derive(Debug, Serialize)]
 struct TipPosition {
     tip_mm: [f64; 3],
@@ -61,7 +61,6 @@ struct TipPosition {
 }
 
 impl TipPosition {
-    /// From the measured angles.
     fn of(measured: &MeasuredPose) -> Self {
         let pose = measured.tip_pose();
         Self {

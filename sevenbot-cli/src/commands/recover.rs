@@ -189,7 +189,8 @@ fn wait_for_servos(arm: &mut Arm) -> Result<Health, CommandError> {
     }
 }
 
-/// Step 4: the health once nothing was wrong for [`QUIET_TIME`], or after [`RECOVERY_TIMEOUT`].
+/// Step 4: the health once the motors have held the arm for [`QUIET_TIME`] without a problem for which [`needs_motors`] is
+/// true, or after [`RECOVERY_TIMEOUT`].
 fn wait_until_well(arm: &mut Arm) -> Result<Health, CommandError> {
     let start = arm.now();
     let mut well_since = start;

@@ -46,7 +46,7 @@ pub(crate) fn run(session: &mut Session, args: &RegistersArgs) -> Result<(), Com
     session.printer.print_raw(text.as_bytes())
 }
 
-/// Columns of text.
+/// The table as columns of text, with a line of headings.
 fn text() -> String {
     let head = ["address", "name", "region", "access", "range", "default", "unit", "map"].map(str::to_owned);
     let cells = |row| {

@@ -117,7 +117,7 @@ pub(crate) struct ServeArgs {
 /// The longest path of a Unix socket, in bytes, that every system accepts.
 const LONGEST_PATH: usize = 100;
 
-/// Where programs can connect.
+/// An address or a link at which programs can connect.
 #[derive(Serialize)]
 pub(super) struct Ready {
     pub(super) ready: String,
@@ -150,7 +150,7 @@ pub(super) fn open_server(
     local: Option<&LocalServer>,
     open: impl FnOnce(ServerConfig) -> Result<Server, StartError>,
 ) -> Result<(Server, Stop), CommandError> {
-    // Catch Ctrl-C before the links are created: it has to remove them.
+    // Catch Ctrl-C before the links are created, so that they are removed in any case.
     let stop = stop_signal()?;
     let config = ServerConfig { socket: local.map(|local| local.socket.clone()), ..config };
     let server = open(config).map_err(|error| CommandError::Arm(error.to_string()))?;

@@ -80,7 +80,7 @@ pub(crate) fn run(session: &mut Session, args: &SetArgs) -> Result<(), CommandEr
         return Err(not_served(&arm, address));
     }
     confirm_release(&mut arm, span, &bytes, args.yes)?;
-    // Targets, offsets and the motor state move the arm.
+    // Targets, offsets and the motor state move the arm, so Ctrl-C has to make it hold.
     let written = hold_on_interrupt(&mut arm, |arm, _| {
         let moves = |address| [TARGET_POSITION, FINE_TARGET, SPEED].iter().any(|row| row.holds(address));
         if span.addresses().any(moves) {
@@ -105,7 +105,7 @@ pub(crate) fn run(session: &mut Session, args: &SetArgs) -> Result<(), CommandEr
     written
 }
 
-/// Asks for confirmation, as `state` does, if this write would let a driven arm go.
+/// Asks for confirmation, as `state` does, if this write would take the torque of a driven arm away.
 fn confirm_release(arm: &mut Arm, span: Span, bytes: &[u8], yes: bool) -> Result<(), CommandError> {
     let wanted = span.addresses().zip(bytes).find(|(address, _)| MOTOR_STATE.holds(*address));
     match wanted {
@@ -114,7 +114,8 @@ fn confirm_release(arm: &mut Arm, span: Span, bytes: &[u8], yes: bool) -> Result
     }
 }
 
-/// The bytes for a span: one value per register, or one for all. A register of two bytes takes one value.
+/// The bytes for a span: one value per register, or one for all. A register of two bytes takes one value. With `raw`, each
+/// value is a byte.
 fn bytes(span: Span, values: &[i32], raw: bool) -> Result<Vec<u8>, CommandError> {
     let encoded =
         if raw { register_values::raw_bytes(span, values) } else { register_values::bytes(span, values) };

@@ -1,4 +1,4 @@
-//! `status`: each joint, the servos and the supply, what is wrong and what to do.
+//! `status`: shows each joint, the servos and the supply, the problems and their remedies.
 
 use std::io::{self, Write};
 

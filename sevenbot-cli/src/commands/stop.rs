@@ -76,11 +76,11 @@ impl Printable for Stopped {
 /// The result of stopping an arm, and the port of the arm.
 type Outcome = (Result<JointSnapshot, CommandError>, String);
 
-/// Stops all arms at the same time. The ports that a server holds are stopped through the server.
+/// Stops all arms at the same time. An arm whose port a server holds is stopped through the server.
 fn stop_all(session: &mut Session) -> Result<(), CommandError> {
     let served: Vec<_> = network::servers().iter().map(network::LocalServer::address).collect();
     let simulators = running_simulators();
-    // Any other port may lead to another device, so it may fail to open.
+    // Any other port may lead to another device, so a failure to open it is only a warning.
     let is_arm = |port: &String| served.iter().chain(&simulators).chain(&session.port).any(|arm| arm == port);
     let mut failed: Option<CommandError> = None;
     let (mut has_stopped, mut tried) = (false, Vec::new());
@@ -106,7 +106,7 @@ fn stop_all(session: &mut Session) -> Result<(), CommandError> {
 }
 
 /// Stops each arm in a thread of its own, and waits for all threads. The caller prints afterwards, so that an output error
-/// keeps no arm from being stopped.
+/// cannot prevent a stop.
 fn stop_each(session: &Session, served: &[String], simulators: &[String]) -> Vec<Outcome> {
     let listed = ports::available().into_iter().map(|port| port.name);
     let free = |port: &String| network::serving(port).is_none();
@@ -125,7 +125,8 @@ fn stop_each(session: &Session, served: &[String], simulators: &[String]) -> Vec
     threads.into_iter().filter_map(|thread| thread.join().ok()).collect()
 }
 
-/// The port, with its canonical path as the key. So a port with two names is opened once: two threads would find it busy.
+/// The port, with its canonical path as the key. So a port with two names is opened once. Otherwise a second thread would
+/// find it busy.
 fn by_path(port: String) -> (PathBuf, String) {
     (fs::canonicalize(&port).unwrap_or_else(|_| PathBuf::from(&port)), port)
 }

@@ -82,7 +82,7 @@ pub(crate) fn run(session: &mut Session, args: &ViewArgs) -> Result<(), CommandE
     run_server(server, &stop, local.as_ref())
 }
 
-/// `None`: no port leads to an arm, or the page is to simulate one.
+/// The location of the arm. `None`: no port leads to one, or the port is a simulated arm, which the page simulates itself.
 fn find_arm(session: &Session) -> Result<Option<ArmLocation>, CommandError> {
     if session.port.as_deref().and_then(simulated_port).is_some() {
         return Ok(None);

@@ -1,4 +1,4 @@
-//! Commands that stop the arm, with arms that lose writes.
+//! `stop`, Ctrl-C, and commands whose writes are lost: what they report, and what they leave in the registers.
 
 #![cfg(unix)]
 

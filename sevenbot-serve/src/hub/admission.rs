@@ -146,7 +146,8 @@ impl Hub {
         client.queue(now, waiting);
     }
 
-    /// May the client move the arm?
+    /// Checks whether the client may send a write with this intent now. If it may, and the write moves or switches
+    /// something, the client drives. Otherwise counts the write as dropped.
     fn check_motion(&mut self, now: Instant, id: ClientId, intent: Intent) -> Result<(), Admission> {
         let Some(client) = self.clients.get_mut(&id).filter(|_| intent.is_ended_by_stop()) else {
             return Ok(());

@@ -1,9 +1,9 @@
-//! Angles of joints, and the limits of the arm, in the values of registers that were read or are to be written.
+//! Finds the angles of joints, and the limits of the arm, in register values that were read or are to be written.
 
 use protocol_core::registers::map::LIMITS;
 use protocol_core::registers::{JOINTS, Joint, Register};
 
-/// An angle for each joint, in hundredths of a degree; `None` where there is none.
+/// The angle of each joint in hundredths of a degree; `None` for a joint whose registers are not among the values.
 pub(crate) type Angles = [Option<u16>; JOINTS];
 
 /// The value of a fine position that was not measured.

@@ -1,4 +1,4 @@
-//! Is a 7Bot V2 behind the port, and does it still answer?
+//! Finds out whether a 7Bot V2 is behind the port, and whether it still answers.
 //!
 //! ```text
 //!   Absent ── the port opens ──▶ Identifying ── a 7Bot V2 answers ──▶ Present ── no reply for 3 s ─────▶ Silent
@@ -16,7 +16,7 @@ use super::line::Owner;
 use super::presence::Presence;
 use super::{ArmState, Hub};
 
-/// Time between two questions to a port behind which no arm has answered yet.
+/// Time between two questions to a port behind which no arm answers.
 const IDENTIFY_PERIOD: Duration = Duration::from_millis(250);
 
 impl Hub {
@@ -75,8 +75,8 @@ impl Hub {
         }
     }
 
-    /// Processes the identity that a device answered, and ignores a device that is no 7Bot V2. Switches off the reports that an
-    /// earlier program left running.
+    /// Processes the identity that a device answered. Ignores a device that is no 7Bot V2 or not the expected arm. Unless
+    /// the hub is read-only, switches off the reports that an earlier program left running.
     pub(super) fn identify(&mut self, now: Instant, values: &[u8]) {
         let Some(known) = KnownRegisters::of_arm(values) else { return };
         let is_wanted = self.chip_id.as_deref().is_none_or(|id| known.chip_id() == id);

@@ -76,7 +76,7 @@ pub(crate) struct Client {
     readings: Readings,
     /// Writes that were not carried out, wrapping.
     pub(crate) dropped: u16,
-    /// When it closed its connection.
+    /// When it closed its connection; `None` while it is connected.
     pub(crate) left: Option<Instant>,
     pub(crate) events: VecDeque<Event>,
     pub(crate) own: OwnRegisters,
@@ -117,7 +117,7 @@ impl Client {
         }
     }
 
-    /// Queues a request. An urgent one goes before the others.
+    /// Queues a request. An urgent one goes before the others, up to [`MOST_URGENT`] in each period.
     pub(crate) fn queue(&mut self, now: Instant, waiting: Waiting) {
         if waiting.intent.is_urgent() && self.may_be_urgent(now) {
             self.urgent.push_back(waiting);

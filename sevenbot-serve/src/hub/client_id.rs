@@ -1,6 +1,6 @@
-//! The name of a client.
+//! The identity of a client.
 
-/// A client of the hub.
+/// Identifies a client of the hub. A new client gets the next number.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct ClientId(u32);
 

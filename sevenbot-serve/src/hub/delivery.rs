@@ -1,5 +1,4 @@
-//! From the line to the clients: each reply to the client that asked, with the server's values in the registers that the server
-//! keeps.
+//! Delivers replies from the line to the clients that asked, and replaces the values of the registers that the server keeps.
 
 use host_link::sharing::{self, DrivenBy, SharingState};
 use protocol_core::registers::map::{FAULTS, fault};

@@ -1,4 +1,4 @@
-//! Which client drives the arm, and which ones may.
+//! Decides which client drives the arm, and which clients may.
 //!
 //! A client drives while it writes targets, until it has written none for a second. A stop ends the streams of the other
 //! clients: their targets are dropped until they start anew. They do so by a pause of a second without a target, or by a
@@ -25,7 +25,7 @@ impl Driving {
         self.last_motion.is_some_and(|at| now - at < PAUSE)
     }
 
-    /// Another client stopped the arm.
+    /// Notes that another client stopped the arm. That ends the stream of this client, if it wrote a target in the last second.
     pub(crate) fn stop(&mut self, now: Instant) {
         self.is_stopped |= self.is_active(now);
     }

@@ -25,16 +25,17 @@ use super::watchdog::WatchdogAction;
 /// ([D23](protocol_core::decisions#d23)).
 const BRAKE: u8 = 1;
 
-/// How an arm is after a hold of the hub.
+/// The state of an arm after a hold of the hub.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HoldOutcome {
     /// Its joints hold where they are.
     Holds,
-    /// Its motors are off.
+    /// Its motors are damped or off.
     Limp,
     /// It has not confirmed the hold: it may be moving.
     Unconfirmed,
-    /// It holds, or its motors are off. It has not taken back the set-point period or the speeds from before the hold.
+    /// It holds, or its motors are damped or off. It has not taken back the set-point period or the speeds from before the
+    /// hold.
     NotRestored,
 }
 
@@ -75,7 +76,7 @@ impl Hub {
         self.news.extend(self.clients.keys());
     }
 
-    /// The watchdog of a client acts.
+    /// Carries out the action of a client's watchdog.
     pub(super) fn act(&mut self, now: Instant, action: WatchdogAction) {
         match action {
             WatchdogAction::Hold => self.start_hold(),
@@ -185,7 +186,7 @@ impl Hub {
         }
     }
 
-    /// The set-point period of the clients, if the arm has another one.
+    /// The frame that restores the set-point period of the clients; none if the arm has this period.
     fn period_to_restore(&self, found: &[u8]) -> Vec<Frame> {
         let wanted = self.known.word(SET_POINT_PERIOD.address).to_le_bytes();
         (found != wanted).then(|| (SET_POINT_PERIOD.address, wanted.to_vec())).into_iter().collect()
@@ -200,8 +201,8 @@ impl Hub {
         joined(is_slow.map(|(register, _)| (register, vec![self.known.byte(register)])))
     }
 
-    /// Replaces the temporary values of a hold in a reply to a client by those from before. Otherwise a client that remembers
-    /// them would restore them later.
+    /// In a reply to a client, replaces the temporary values of a hold by the values from before the hold. Otherwise a
+    /// client would remember the temporary values, and restore them later.
     pub(super) fn overlay_changed(&self, address: u8, values: &mut [u8]) {
         if self.hold.is_none() {
             return;

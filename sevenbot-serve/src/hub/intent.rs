@@ -24,12 +24,12 @@ pub(crate) enum Intent {
     Hold,
     /// As `Hold`, with at least [`STOP_JOINTS`] joints, so it is a stop of the arm.
     Stop,
-    /// It switches the motors off.
+    /// It switches the motors to damping or forceless.
     MotorsOff,
 }
 
 impl Intent {
-    /// Of a write, sent by a client that has read these positions.
+    /// The intent of a write from a client that has read the positions in `readings`.
     pub(crate) fn of(now: Instant, map: Map, address: u8, values: &[u8], readings: &Readings) -> Self {
         let covers = |row: &Register| covers(row, address, values.len());
         let state = byte_at(MOTOR_STATE.address, address, values);

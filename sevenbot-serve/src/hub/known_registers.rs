@@ -39,7 +39,7 @@ impl KnownRegisters {
         has_code.then_some(known)
     }
 
-    /// The chip id.
+    /// The chip id: 6 bytes, the most significant one first.
     pub(crate) fn chip_id(&self) -> &[u8] {
         self.0.read(CHIP_ID.address, CHIP_ID.count)
     }

@@ -145,7 +145,7 @@ impl Line {
         self.free_at(now) <= now
     }
 
-    /// When the line is free for another frame. Not before the port takes bytes, if it takes fewer than the baud rate allows.
+    /// When the line is free for another frame. [`Instant::FAR_FUTURE`] while [`MOST_OUTPUT`] bytes or more wait for the port.
     pub(crate) fn free_at(&self, now: Instant) -> Instant {
         if self.output.len() >= MOST_OUTPUT {
             Instant::FAR_FUTURE

@@ -12,7 +12,7 @@
 //!   arm once, at the highest frequency that any client wants, and all clients share the values.
 //! * Without an arm requests are dropped. A request that waited could move an arm that a person just plugged in. With an arm, a
 //!   request that moves or switches something is dropped after 200 ms in the queue.
-//! * A stop goes before everything else, and ends what the other clients stream (`drive`, `intent`).
+//! * A stop goes before everything else, and ends the streams of the other clients (`drive`, `intent`).
 
 mod admission;
 mod angles;
@@ -67,7 +67,7 @@ pub struct HubOptions {
     pub has_one_driver: bool,
 }
 
-/// Does an arm answer?
+/// The state of the port to the arm, and of the arm behind it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum ArmState {
     /// The port is closed.

@@ -57,7 +57,7 @@ impl OwnRegisters {
         covers(&OFFSET, address, count.into()).then_some(self.last_map.unwrap_or(before_writes))
     }
 
-    /// A write of 53 stops the reports of map 2.1 ([M4](protocol_core::decisions#m4)).
+    /// Applies a write in map 2.2. A write of register 53 stops the reports of map 2.1 ([M4](protocol_core::decisions#m4)).
     fn write_map22(&mut self, address: u8, values: &mut [u8]) {
         if let Some(byte) = byte_at(address, values, &FEEDBACK_FREQUENCY) {
             *self = Self { positions: std::mem::take(byte), angles: 0, loads: 0, ..*self };
@@ -67,7 +67,7 @@ impl OwnRegisters {
         }
     }
 
-    /// Every write stops the reports of map 2.2 ([M4](protocol_core::decisions#m4)).
+    /// Applies a write in map 2.1. Every such write stops the reports of map 2.2 ([M4](protocol_core::decisions#m4)).
     fn write_map21(&mut self, address: u8, values: &mut [u8]) {
         self.positions = 0;
         if let Some(byte) = byte_at(address, values, &ANGLE_FEEDBACK_FREQUENCY) {

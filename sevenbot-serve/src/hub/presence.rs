@@ -1,4 +1,4 @@
-//! Does the arm still answer? An arm that was switched off behind its adapter leaves the port open.
+//! Finds out whether the arm still answers. An arm that was switched off behind its adapter leaves the port open.
 //!
 //! ```text
 //!   a reply ──▶ heard      1 s without one, while a read waits or a class watches ──▶ the hub asks, once a second
@@ -29,7 +29,7 @@ impl Presence {
     /// The question: the first register, and how many.
     pub(crate) const QUESTION: (u8, u8) = (DEVICE_CODE.address, 1);
 
-    /// The arm answered something.
+    /// Notes that the arm answered something.
     pub(crate) const fn hear(&mut self, now: Instant) {
         (self.heard, self.misses) = (now, 0);
     }
@@ -42,7 +42,7 @@ impl Presence {
         }
     }
 
-    /// The question is sent.
+    /// Notes that the question is sent.
     pub(crate) const fn ask(&mut self, now: Instant) {
         self.asked = now;
     }

@@ -30,7 +30,7 @@ struct Reading {
 pub(crate) struct Readings(VecDeque<Reading>);
 
 impl Readings {
-    /// The client got these values.
+    /// Notes that the client got these values. Keeps them only if they hold positions.
     pub(crate) fn note(&mut self, now: Instant, address: u8, values: &[u8]) {
         let holds = |row| angles_in(row, address, values).iter().any(Option::is_some);
         if !holds(&PRESENT_POSITION) && !holds(&FINE_POSITION) {
@@ -55,8 +55,9 @@ impl Readings {
 }
 
 impl Reading {
-    /// The number of joints whose target in the write is the position of this reading; `None` if one is not. A joint may also
-    /// keep the target of this reading. If the reading has the limits (register 188), the held positions are kept within them.
+    /// The number of joints whose target in the write is the position of this reading; `None` if a joint has another
+    /// target. A joint may also keep the target that this reading shows. If the reading has the limits (register 188), the
+    /// held positions are kept within them.
     fn held(&self, targets: &Register, positions: &Register, address: u8, values: &[u8]) -> Option<usize> {
         let written = angles_in(targets, address, values);
         let [present, measured] = [targets, positions].map(|row| angles_in(row, self.address, &self.values));

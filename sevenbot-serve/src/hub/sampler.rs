@@ -63,7 +63,7 @@ impl Sampler {
         begins
     }
 
-    /// A sample was asked for.
+    /// Notes that a sample was requested, and advances the timer of its stream.
     pub(crate) fn note_sent(&mut self, now: Instant, stream: ReportKind) {
         self.waits = false;
         if let Some(timer) = self.timers.get_mut(stream.index()) {

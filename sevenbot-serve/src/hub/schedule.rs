@@ -20,7 +20,7 @@ impl Timer {
     /// Switched off.
     pub(crate) const OFF: Self = Self { period: Duration::ZERO, due: Instant::FAR_FUTURE };
 
-    /// A frequency of 0 Hz switches off. The same frequency as before keeps the time.
+    /// Sets the frequency in Hz; 0 switches the timer off. An unchanged frequency keeps the due time.
     pub(crate) fn set(&mut self, now: Instant, frequency: u32) {
         let period = Duration::from_micros(1_000_000_u32.checked_div(frequency).unwrap_or(0).into());
         if period == Duration::ZERO {

@@ -1,4 +1,4 @@
-//! From the queues to the line: stops first, then the frames of the hub itself, then the client whose turn it is.
+//! Sends the queued requests over the line: stops first, then the frames of the hub itself, then the client whose turn it is.
 
 use protocol_core::registers::Map;
 use protocol_core::registers::map::{OFFSET, SPEED};

@@ -88,7 +88,7 @@ mod tests {
         let mut wait = 0;
         for turn in 0..10_000 {
             let next = (0..31).min_by_key(|&client| Shares::order(busy[client], 269)).unwrap();
-            // It asks again while the reply to another one is on the line.
+            // The short client asks again while the reply to another client is on the line.
             if turn % 2 == 0 && Shares::order(one, 21) < Shares::order(busy[next], 269) {
                 shares.charge(&mut one, 21);
                 waits.push(wait);

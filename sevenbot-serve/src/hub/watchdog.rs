@@ -30,7 +30,7 @@ const LEAST_OF_ARM: u8 = 20;
 pub(crate) enum WatchdogAction {
     /// Every joint holds.
     Hold,
-    /// The motors are switched off.
+    /// The motors go to damping (motor state 0).
     Damp,
 }
 
@@ -73,7 +73,7 @@ impl ClientWatchdog {
         *self = Self { watched: (steps > 0).then_some(watched), has_acted: false };
     }
 
-    /// The arm may have restarted.
+    /// Forgets the watchdog, because the arm may have restarted.
     pub(crate) fn forget(&mut self) {
         *self = Self::default();
     }

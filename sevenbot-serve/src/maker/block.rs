@@ -1,4 +1,4 @@
-//! The blocks of registers for inverse kinematics: positions and directions in JSON, encoded as map 2.1 has them
+//! Encodes the positions and directions in JSON as the register blocks of map 2.1 for inverse kinematics
 //! ([M7](protocol_core::decisions#m7)).
 
 use motion_core::reach;

@@ -239,19 +239,21 @@ fn request(command: &MakerCommand) -> Option<WholeRequest> {
     })
 }
 
-/// Function 04, so that offsets have the forms of the maker's programs ([M5](protocol_core::decisions#m5)).
+/// A write by function 04, so that offsets have the forms of the maker's programs ([M5](protocol_core::decisions#m5)).
 fn write(address: u8, values: Vec<u8>) -> WholeRequest {
     WholeRequest::Write { map: Map::V21, address, values }
 }
 
-/// The maker's arm first switches all joints to the servo state, if the position has a solution.
+/// The writes of a block. As on the maker's arm, the first one switches the motors to the servo state, if the position has
+/// a solution.
 fn solving_writes(address: u8, values: &[u8]) -> Vec<(u8, Vec<u8>)> {
     let block = (address, values.to_vec());
     let engage = has_solution(address, values).then(|| (MOTOR_STATE.address, vec![motor_state::SERVO]));
     engage.into_iter().chain([block]).collect()
 }
 
-/// The arm counts a frame that it refuses. No other client's frame is between the two reads of the counter.
+/// The answer to a block, from the arm's counter of refused frames before and after the writes. The counter shows a
+/// refusal, because no other client's frame is between the two reads.
 fn solution(before: &Event, after: &Event) -> Value {
     match (before, after) {
         (Event::Reply { values: before, .. }, Event::Reply { values: after, .. }) => {

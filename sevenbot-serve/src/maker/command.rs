@@ -11,7 +11,7 @@ use super::block::Block;
 /// What a message asks for.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum MakerCommand {
-    /// Whether the server is there.
+    /// Asks whether the server answers.
     Ping,
     /// Reads registers.
     Read {

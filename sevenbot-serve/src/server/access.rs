@@ -1,4 +1,4 @@
-//! Who may open a WebSocket: the checks of the HTTP request.
+//! Decides from the HTTP request who may open the maker's WebSocket. The other sites use parts of these checks.
 //!
 //! A browser lets any page connect to any address, and tells the server which page it was (`Origin`) and which name it
 //! looked up (`Host`). So both are checked: otherwise each web site that is open on this computer could move the arm.
@@ -22,7 +22,7 @@ pub struct AccessPolicy {
 }
 
 impl std::fmt::Debug for AccessPolicy {
-    /// Without the secret.
+    /// Leaves out the secret.
     fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self { token, allows_any_page } = self;
         let mut form = formatter.debug_struct("AccessPolicy");

@@ -43,7 +43,7 @@ impl Places {
     }
 }
 
-/// The places.
+/// The places of the connections, and the wrong tokens of each address.
 #[derive(Debug)]
 pub(super) struct Admission {
     connections: Arc<Semaphore>,
@@ -59,7 +59,7 @@ struct WrongTokens {
     count: u32,
     /// The next token from this address is not checked before this time.
     next: Instant,
-    /// Connections that wait for that.
+    /// Connections that wait for the check of their tokens.
     waiting: u32,
 }
 
@@ -111,7 +111,8 @@ impl Admission {
         Arc::clone(&self.connections).acquire_owned().await.ok()
     }
 
-    /// Runs the login of a connection, which has to end within `timeout`. `None` if it does not, or lost its place.
+    /// Runs the login of a connection. `None` if the login fails or does not end within `timeout`, or if the connection
+    /// loses its place.
     pub(super) async fn log_in<T>(
         &self,
         timeout: Duration,
@@ -234,7 +235,8 @@ mod tests {
         });
     }
 
-    /// The wrong tokens that may have been checked this long after the first one: the next ones 0.1, 0.3 and 0.7 s after it.
+    /// The largest number of wrong tokens that may have been checked `elapsed` after the first one: the next ones follow it
+    /// by 0.1, 0.3 and 0.7 s.
     fn most_checks(elapsed: Duration) -> u32 {
         let (mut count, mut wait, mut next) = (1, FIRST_WAIT, FIRST_WAIT);
         while next <= elapsed {
@@ -245,7 +247,7 @@ mod tests {
         count
     }
 
-    /// All of them connect at once.
+    /// 200 connections with wrong tokens come at once.
     #[test]
     fn wrong_tokens_of_one_address_are_checked_one_after_the_other() {
         run(async {
@@ -265,7 +267,7 @@ mod tests {
             tokio::time::sleep(Duration::from_millis(650)).await;
             let refused = guesses.iter().filter(|guess| guess.is_finished()).count();
             let checked = lock(&admission.wrong).get(&address).unwrap().count;
-            // 3, before 0.7 s: a busy machine may be here later.
+            // At most 3 until 0.7 s have passed. A busy machine may get here later.
             let most = most_checks(start.elapsed());
             assert!(checked <= most, "{checked} in {:?}", start.elapsed());
             let most = usize::try_from(most).unwrap();

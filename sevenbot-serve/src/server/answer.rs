@@ -15,7 +15,7 @@ use super::access::{Refusal, is_address};
 /// Finds a file of the page by its path below the root, such as `index.html`.
 pub type PageFiles = fn(&str) -> Option<Cow<'static, [u8]>>;
 
-/// Whose screen a tab of a class is.
+/// Who uses a tab of a class.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Role {
     Pupil,
@@ -76,7 +76,7 @@ pub(super) fn check_origin<B>(request: &Request<B>, host: &str, is_encrypted: bo
     Ok(())
 }
 
-/// A file of the page.
+/// The answer with a file of the page.
 pub(super) fn file<B>(
     files: PageFiles,
     request: &Request<B>,

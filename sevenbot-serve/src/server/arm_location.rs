@@ -1,4 +1,4 @@
-//! Where the arm's serial port is, and which ports are tried after the arm was unplugged.
+//! Defines where the arm's serial port is, and chooses the port to try after the arm was unplugged.
 //!
 //! An adapter that is plugged in again may get another name. Ports that were there all the time belong to other
 //! devices, and are not opened: opening a port restarts some of them.
@@ -33,7 +33,7 @@ impl PortSearch {
         Self { list, others: None }
     }
 
-    /// The arm is behind `path`, and so not behind the other ports.
+    /// Notes that the arm is behind `path`. So the other ports of this moment belong to other devices.
     pub(crate) fn found(&mut self, path: &Path) {
         let mut others = (self.list)();
         others.retain(|port| port != path);

@@ -66,17 +66,18 @@ impl ArmPort {
         }
     }
 
-    /// Ends when the port has bytes, or takes some.
+    /// Ends when the port has bytes, or with `has_output`, when it takes bytes.
     async fn is_ready(&self, has_output: bool) {
         let ArmPortState::Open(port, _) = &self.state else { return std::future::pending().await };
-        // An error shows itself when the port is used.
+        // Ignore an error here: the next read or write returns it.
         let _ = tokio::select! {
             ready = port.readable() => ready,
             ready = port.writable(), if has_output => ready,
         };
     }
 
-    /// Opens the port if it is time to, and passes bytes of the arm to the hub.
+    /// Opens the port if that is due, and passes bytes of the arm to the hub. Closes the port after an error, or if no arm
+    /// has answered in time.
     fn receive(&mut self, hub: &mut Hub, now: Instant, notify: &mut dyn FnMut(Notice)) {
         let timeout = self.identify_timeout();
         match &mut self.state {
@@ -112,8 +113,8 @@ impl ArmPort {
         }
     }
 
-    /// Does the port of a silent arm stay open? Then a stop may still reach the arm, and unplugging the adapter is an error.
-    /// But with a search the port is closed, to try other names.
+    /// Does the port of a silent arm stay open? Then a stop may still reach the arm, and the port reports an error when the
+    /// adapter is unplugged. With a search the port is closed, so that other names can be tried.
     const fn stays_open(&self, hub: &Hub) -> bool {
         hub.is_silent() && self.search.is_none()
     }

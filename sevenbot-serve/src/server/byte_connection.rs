@@ -11,7 +11,7 @@ use super::pace::Pace;
 use super::seat::End;
 use super::shared::Shared;
 
-/// Bytes that are read at once. Between two pieces of a flood the others have their turns.
+/// Bytes that are read at once. Between two pieces of a flood other connections have their turns.
 const PIECE: usize = 512;
 /// The first byte of a frame. A web page can reach this port, but its data begins with a method of HTTP or the handshake of
 /// TLS.
@@ -37,7 +37,7 @@ pub(super) struct First {
 /// Serves a client until it ends.
 ///
 /// # Errors
-/// The client speaks something else than frames.
+/// The client's first byte is not that of a frame.
 pub(super) async fn serve(
     shared: &Arc<Shared>,
     stream: impl ByteStream,
@@ -91,7 +91,7 @@ pub(super) async fn serve(
     Ok(())
 }
 
-/// A client whose bytes have to be frames.
+/// A client whose first byte has to be that of a frame.
 struct FrameStream {
     session: FrameSession,
     has_begun: bool,
@@ -106,7 +106,7 @@ impl FrameStream {
     }
 }
 
-/// Receives bytes; how the connection ended if there are none.
+/// Receives bytes. The error tells how the connection ended.
 async fn receive<'a>(reader: &mut (impl AsyncRead + Unpin), piece: &'a mut [u8]) -> Result<&'a [u8], End> {
     match reader.read(piece).await {
         Ok(0) => Err(End::Clean),

@@ -23,10 +23,10 @@ use crate::token::is_equal;
 
 /// How long a client may take for the handshake of TLS, and to send the token.
 const LOGIN_TIMEOUT: Duration = Duration::from_secs(5);
-/// The longest first line.
+/// The longest first line, which holds the token, in bytes.
 const LONGEST_LINE: usize = 256;
 
-/// The state that all connections of a TCP port share.
+/// The state that all connections of a TCP port, or of the Unix socket, share.
 #[derive(Clone)]
 pub(super) struct ByteServer {
     pub(super) shared: Arc<Shared>,

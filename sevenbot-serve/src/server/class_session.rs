@@ -22,7 +22,7 @@ pub(super) struct ClassSession {
 }
 
 impl ClassSession {
-    /// `key`: a new secret, for a pupil.
+    /// Opens the session of a new tab. `key` is a new secret; a teacher's screen does not use it.
     pub(super) fn open(class: &Arc<Class>, role: Role, key: String) -> Self {
         let id = class.with(|room, now| match role {
             Role::Pupil => room.open_pupil(now, key),

@@ -3,7 +3,7 @@
 //! ```text
 //!   /                 ──▶ the page of a pupil, /?class
 //!   /teacher.html     ──▶ the teacher's screen. Its address has the teacher's secret, which the page passes on
-//!   /class?token=CODE ──▶ messages of a pupil; no code is needed if there is none
+//!   /class?token=CODE ──▶ messages of a pupil; without `token` if the class has no code
 //!   /teacher?token=SECRET ──▶ messages of the teacher
 //!   /frames?token=KEY ──▶ frames for the real arm, as long as the pupil with this key has it
 //! ```

@@ -9,7 +9,7 @@ use super::site::{ClassConfig, PageConfig};
 use super::tls::TlsFiles;
 use crate::hub::HubOptions;
 
-/// What to serve.
+/// What a server serves, and to whom.
 #[derive(Clone, Debug)]
 pub struct ServerConfig {
     /// The serial port of the arm; `None`: there is no arm.

@@ -17,7 +17,7 @@ const WANTED: u64 = 2_048;
 /// Descriptors of a connection over the network.
 const OF_CONNECTION: usize = 2;
 
-/// Asks the system for more descriptors. If it gives none, there are fewer places.
+/// Asks the system for more descriptors. If the system refuses, there are fewer places.
 #[cfg(unix)]
 pub(super) fn ask_for_more() {
     use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};

@@ -91,7 +91,7 @@ impl FrameSession {
         self.client.set_drops_reads(are_of_the_one_before);
     }
 
-    /// The connection has ended.
+    /// Ends the session. If the client closed the connection, first passes the last bytes to the hub as far as it has room.
     pub(super) fn close(mut self, end: End) {
         if end == End::Clean {
             self.exchange();

@@ -42,7 +42,7 @@ pub(super) struct Network {
 }
 
 impl Network {
-    /// Serves what is open.
+    /// Serves the listeners that are open. [`Network::spawn_class`] serves the class.
     pub(super) fn spawn(
         self,
         config: &ServerConfig,

@@ -16,7 +16,7 @@ pub enum Notice {
     ArmLost {
         /// The port.
         port: PathBuf,
-        /// Why.
+        /// The error of the port, as text.
         reason: String,
     },
     /// The port is open, and no 7Bot V2 answers.
@@ -27,7 +27,7 @@ pub enum Notice {
     Refused {
         /// Its address.
         peer: Option<SocketAddr>,
-        /// Why.
+        /// Why it was refused.
         reason: RefusalReason,
     },
 }

@@ -75,8 +75,8 @@ impl PtyPort {
         }
     }
 
-    /// Reads bytes, unless earlier ones wait. After the program has closed the terminal it reads without waiting, so that the
-    /// kernel keeps no bytes for the next program.
+    /// Reads bytes, unless earlier ones wait. While no program has the terminal open, reads at once, so that the kernel
+    /// keeps no bytes for the next program.
     fn receive(
         &self,
         session: &mut FrameSession,

@@ -50,7 +50,7 @@ impl Seat {
         }
     }
 
-    /// The connection has ended.
+    /// Leaves the place after the connection has ended.
     pub(super) fn leave(mut self, end: End) {
         self.end = end;
     }

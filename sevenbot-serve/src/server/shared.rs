@@ -98,7 +98,7 @@ impl Shared {
         done
     }
 
-    /// A new client of the hub.
+    /// Registers a client of the hub. The result wakes the task of the client when the hub has news for it.
     pub(super) fn join(&self, id: ClientId) -> Arc<Notify> {
         let wake = Arc::new(Notify::new());
         lock(&self.clients).insert(id, Arc::clone(&wake));
@@ -124,7 +124,8 @@ impl Shared {
     }
 }
 
-/// A task that panicked leaves a hub that others can use: each of its steps is complete.
+/// Locks a mutex, also after a panic: a task that panicked leaves a hub that others can use, because each step of the hub
+/// is complete.
 pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

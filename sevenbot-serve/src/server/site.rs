@@ -24,7 +24,7 @@ pub struct PageConfig {
     pub address: SocketAddr,
     /// The secret that `/frames?token=TOKEN` needs.
     pub token: String,
-    /// The files.
+    /// Finds the files of the page.
     pub files: PageFiles,
 }
 

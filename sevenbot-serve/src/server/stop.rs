@@ -4,12 +4,12 @@ use std::sync::Arc;
 
 use tokio::sync::Notify;
 
-/// Ends a server from another thread, such as that of a signal. Copies end the same server.
+/// Ends a server from another thread, such as the thread of a signal handler. Copies end the same server.
 #[derive(Clone, Debug, Default)]
 pub struct Stop(Arc<Notify>);
 
 impl Stop {
-    /// Ends the server, or the next one that runs with this.
+    /// Ends the server that runs with this stop. If none runs, the next one ends at once.
     pub fn stop(&self) {
         self.0.notify_one();
     }

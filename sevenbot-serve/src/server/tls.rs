@@ -20,7 +20,7 @@ pub struct TlsFiles {
     pub key: PathBuf,
 }
 
-/// Reads the files.
+/// Reads the files, and returns the acceptor of encrypted connections.
 pub(super) fn acceptor(files: &TlsFiles) -> Result<TlsAcceptor, StartError> {
     let failed =
         |option, path: &Path, cause| StartError::Certificate { option, path: path.to_owned(), cause };

@@ -138,7 +138,7 @@ impl WebServer {
         upgrade: &Mutex<Option<Upgrade>>,
     ) -> Response<Full<Bytes>> {
         let since = self.shared.earliest();
-        // Only a request that needs a token waits after wrong ones. The files are public.
+        // Only a request that needs a token is delayed after wrong tokens. The files are public.
         if !self.site.is_public(&request) && self.admission.wait(Some(peer.ip())).await == Err(TooManyWait) {
             self.refused(peer, RefusalReason::Full);
             let text = "Too many wrong tokens came from your address. Try again in a minute.\n";

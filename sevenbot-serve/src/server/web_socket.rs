@@ -79,7 +79,7 @@ struct Messages<S> {
 }
 
 impl<S: AsyncRead + AsyncWrite + Unpin> Messages<S> {
-    /// The next message; how the connection ended if there is none.
+    /// The next message. The error tells how the connection ended.
     async fn next(&mut self) -> Result<Message, End> {
         match self.stream.next().await {
             Some(Ok(Message::Close(_))) | None | Some(Err(Error::ConnectionClosed)) => Err(End::Clean),
@@ -267,7 +267,7 @@ where
     serve(shared, client, LONGEST_COMMAND, || MakerSession::open(shared, is_browser)).await;
 }
 
-/// Serves a client whose messages are text, with a session that is opened once the WebSocket is.
+/// Serves a client whose messages are text. `session` opens its session once the WebSocket is open.
 pub(super) async fn serve_text<S, T: Session>(
     shared: &Shared,
     client: WebClient<S>,

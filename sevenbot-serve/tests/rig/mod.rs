@@ -292,7 +292,7 @@ impl Page {
         self.client.is_overrun()
     }
 
-    /// As the server: a bounded number of messages at once.
+    /// Passes at most 20 messages to the client at once, as the server does.
     fn send(&mut self, hub: &mut Hub, now: Instant) {
         for _ in 0..20 {
             let Some(message) = self.to_send.pop_front_if(|_| !self.client.is_overrun()) else { break };
@@ -346,10 +346,10 @@ impl Program {
     }
 }
 
-/// The registers of the server.
+/// The registers of the server: the first one, and how many.
 pub const SHARING: (u8, u8) = (232, 8);
 
-/// The registers of the server, as a program reads them.
+/// The values of these registers, as a program reads them.
 pub fn sharing(world: &mut World, program: usize) -> Vec<u8> {
     world.take(program);
     world.send(program, &read(SHARING.0, SHARING.1));

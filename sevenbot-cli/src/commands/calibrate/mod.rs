@@ -5,7 +5,7 @@
 //!   then: question ──▶ lock open, write, read back, lock closed ──▶ restart ──▶ read again
 //! ```
 //!
-//! Nothing is written before the question.
+//! No offset is written before the question.
 
 mod offsets;
 
@@ -81,7 +81,8 @@ fn read(arm: &mut Arm) -> Result<Offsets, CommandError> {
     Ok(arm.read_span(Span::of(&OFFSET))?.into())
 }
 
-/// Writes the offsets if they differ, and prints them.
+/// If the offsets differ, asks for confirmation, writes them, and checks them over a restart; with `--yes` it neither asks
+/// nor checks. Then prints the offsets.
 fn store(
     session: &mut Session,
     mut arm: Arm,
@@ -138,7 +139,7 @@ impl CalibrationInput {
     }
 }
 
-/// Asks for the offset of one joint.
+/// Asks for the offset of one joint, and moves the joint as the user says.
 fn ask_offset(arm: &mut Arm, joint: Joint, offset: i16) -> Result<i16, CommandError> {
     loop {
         let measured = arm.read_span(Span::of(&PRESENT_POSITION))?.at(PRESENT_POSITION.of(joint));

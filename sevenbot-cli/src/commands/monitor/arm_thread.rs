@@ -106,7 +106,7 @@ impl ArmThread {
         Err(error)
     }
 
-    /// Samples one arm.
+    /// Samples one arm and executes commands, until the arm is lost or the monitor quits.
     fn watch(&mut self, arm: &mut Arm) -> WatchEnd {
         let mut unanswered = 0;
         let mut due = Instant::now();
@@ -144,7 +144,7 @@ impl ArmThread {
         }
     }
 
-    /// Executes a command, and reports a refusal to the screen.
+    /// Executes a command, and reports a warning or a refusal to the screen. Fails only if the port or the screen is gone.
     fn execute(&mut self, arm: &mut Arm, command: UiCommand) -> Result<(), WatchEnd> {
         let (refusal, lost) = match self.try_execute(arm, command) {
             Ok(None) => return Ok(()),
@@ -162,7 +162,7 @@ impl ArmThread {
         }
     }
 
-    /// Executes a command and verifies it. Returns a warning for the user.
+    /// Executes a command and verifies it. Returns a warning for the user, if there is one.
     fn try_execute(&mut self, arm: &mut Arm, command: UiCommand) -> Result<Option<String>, CommandError> {
         let guard = self.guard.as_ref();
         match command {
@@ -199,8 +199,8 @@ impl ArmThread {
     }
 }
 
-/// Changes a joint's target by some degrees. Reads the target first: the one on the screen may be old. Returns a warning
-/// if the guard would not allow the pose.
+/// Changes a joint's target by some degrees. Reads the target first, because the target on the screen may be old. Returns a
+/// warning if the guard would not allow the pose.
 fn nudge(
     arm: &mut Arm,
     guard: Option<&Guard>,
@@ -221,7 +221,7 @@ fn nudge(
     Ok(breach.map(|breach| breach.to_string()))
 }
 
-/// Moves the tip by some millimetres. Reads the targets first: those on the screen may be old.
+/// Moves the tip by some millimetres. Reads the targets first, because the targets on the screen may be old.
 fn jog_tip(
     arm: &mut Arm,
     jog: &mut Option<Jog>,

@@ -48,7 +48,6 @@ const JOINT_ROWS: u16 = 8;
 /// From this height on there are empty lines around the plot.
 const ROOMY: u16 = 18;
 
-/// Draws the view.
 pub(crate) fn draw(frame: &mut Frame<'_>, view: &MonitorView) {
     let problems = problem_lines(view);
     let heights = heights(frame.area().height, u16::try_from(problems.len()).unwrap_or(0));
@@ -57,7 +56,7 @@ pub(crate) fn draw(frame: &mut Frame<'_>, view: &MonitorView) {
     frame.render_widget(Paragraph::new(title_right(view)).alignment(Alignment::Right), title);
     frame.render_widget(Paragraph::new(table_lines(view, table.width)), table);
     draw_plot(frame, view, plot);
-    // Values of a lost arm are old.
+    // The values of a lost arm are old, so draw them faint.
     let age = if view.arm().is_some() { Style::new() } else { FAINT };
     let lines: Vec<Line<'_>> = problems.into_iter().chain([health(view), link(view)]).collect();
     frame.render_widget(Paragraph::new(lines).style(age), foot);
@@ -250,7 +249,7 @@ fn link(view: &MonitorView) -> Line<'static> {
     ])
 }
 
-/// The error or the note, or else the most important keys.
+/// The last line: the connection error, a note, the keys that move the tip, or the most important keys.
 fn last_line(view: &MonitorView) -> Line<'_> {
     match (&view.connection, view.note()) {
         (LinkState::Looking(reason), _) => Line::styled(format!(" {reason}"), BAD),

@@ -15,7 +15,7 @@ const JOG: i16 = 5;
 const BIG_JOG: i16 = 20;
 /// The help: keys and their effect.
 pub(crate) const HELP: [(&str, &str); 13] = [
-    // The first rows are seen on any screen.
+    // A low screen shows only the first rows.
     ("space", "stop the arm where it is"),
     ("Ctrl-C", "stop the arm where it is, and quit"),
     ("q", "quit; the arm finishes its move"),
@@ -34,11 +34,9 @@ pub(crate) const HELP: [(&str, &str); 13] = [
 /// The effect of a key.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum KeyAction {
-    /// Draw the view again.
     Redraw,
-    /// Send a command to the arm.
     Send(UiCommand),
-    /// End the monitor.
+    /// End the monitor. The arm finishes its move.
     Quit,
     /// Make the arm hold its position, and end the monitor.
     Stop,

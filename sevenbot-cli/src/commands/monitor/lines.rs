@@ -21,7 +21,7 @@ pub(crate) enum LineFormat {
 }
 
 impl LineFormat {
-    /// The names of the columns.
+    /// The line with the names of the columns, without a line feed.
     pub(crate) fn head(self) -> String {
         let joints = |word: &str| Joint::ALL.map(|joint| format!("{word}.{}", joint.number()));
         match self {
@@ -42,7 +42,7 @@ impl LineFormat {
         }
     }
 
-    /// One sample.
+    /// The line of one sample, without a line feed.
     pub(crate) fn line(self, sample: &ArmSample) -> String {
         match self {
             Self::Columns => columns(sample),
@@ -107,7 +107,6 @@ fn numbers(is_so: impl Fn(Joint) -> bool) -> Vec<u8> {
     Joint::ALL.into_iter().filter(|&joint| is_so(joint)).map(Joint::number).collect()
 }
 
-/// One sample as JSON.
 #[derive(Debug, Serialize)]
 pub(crate) struct SampleJson {
     seconds: f64,

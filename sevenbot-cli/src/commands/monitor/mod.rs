@@ -94,12 +94,11 @@ pub(crate) fn run(session: &mut Session, args: &MonitorArgs) -> Result<(), Comma
     }
 }
 
-/// The time between two samples.
 pub(super) fn period(hz: u8) -> Duration {
     Duration::from_secs(1) / u32::from(hz)
 }
 
-/// Takes `count` samples, one per period, or fewer if Ctrl-C ends it.
+/// Takes `count` samples, one per period, passes each to `take`, and warns of new problems. Ctrl-C ends it.
 pub(super) fn each_sample(
     arm: &mut Arm,
     period: Duration,

@@ -49,7 +49,7 @@ impl PlotKind {
     }
 }
 
-/// A sample of the past.
+/// The values of an earlier sample that the plot can show.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PastSample {
     pub(crate) time: Duration,

@@ -10,14 +10,14 @@ use sevenbot::{Angle, Arm, Error, Health, Joint, StatusBlock};
 /// The state of an arm at one time.
 #[derive(Clone, Debug)]
 pub(crate) struct ArmSample {
-    /// Since the start of the monitor.
+    /// The time since the start of the monitor.
     pub(crate) time: Duration,
     pub(crate) joints: JointSnapshot,
     /// Positions in hundredths, velocities and loads; `None` from an arm without the extended block.
     pub(crate) fine: Option<FineState>,
     /// The problems, joint by joint.
     pub(crate) health: Health,
-    /// From a request to its reply.
+    /// The time from the first request to its reply.
     pub(crate) round_trip: Duration,
 }
 

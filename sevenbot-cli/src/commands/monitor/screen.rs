@@ -19,10 +19,10 @@ use crate::interrupt::{Interrupt, report_hold};
 use crate::printer::warn;
 use crate::session::Session;
 
-/// Time between two frames on the screen, and the longest reaction time to a key.
+/// The longest time between two frames on the screen. A key ends the wait early; a sample does not.
 const FRAME: Duration = Duration::from_millis(40);
 
-/// Shows the arm until the user quits.
+/// Shows the arm until the user quits. After Ctrl-C the arm holds.
 pub(crate) fn run(
     session: &Session,
     period: Duration,
@@ -51,7 +51,7 @@ pub(crate) fn run(
     };
     let watching = thread::spawn(|| watcher.run());
     let shown = on_terminal(|terminal| show(terminal, &mut view, start, &hear, &command));
-    // Closing the channel ends the thread. After Ctrl-C it drops the pending commands.
+    // Closing the channel ends the thread. After Ctrl-C the thread drops the pending commands.
     drop(command);
     let held = watching.join().ok().flatten();
     shown?;

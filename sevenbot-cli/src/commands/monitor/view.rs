@@ -31,11 +31,10 @@ pub(crate) enum ArmEvent {
     Found { port: String, firmware: String },
     /// Not connected, for this reason.
     Lost(String),
-    /// A new sample.
     Sample(ArmSample),
     /// A question without an answer, and the number of damaged frames received.
     Unanswered { damaged: usize },
-    /// A command failed.
+    /// A command failed, for this reason.
     Refused(String),
     /// A command was executed, and the user should know this.
     Warned(String),
@@ -48,9 +47,9 @@ pub(crate) enum UiCommand {
     Nudge { joint: Joint, degrees: i16 },
     /// Move the tip by x, y and z along these axes.
     Jog { axes: JogAxes, millimetres: [i16; 3] },
-    /// Change the speed of all joints, starting from the speed of this joint.
+    /// Apply the change to the speed of this joint, and set the speed of all joints to the result.
     SpeedChange { joint: Joint, change: SpeedChange },
-    /// Change the motor state.
+    /// Write this motor state (register 29).
     State(u8),
     /// Make the arm hold where it is.
     Stop,
@@ -69,7 +68,7 @@ impl SpeedChange {
     /// The highest value of the register. The value 0 is faster: the motor's maximum (D10).
     const HIGHEST: u8 = 100;
 
-    /// The next speed of the register.
+    /// The value of the speed register after the change.
     pub(crate) const fn after(self, steps: u8) -> u8 {
         match (self, steps) {
             (Self::Faster, 0 | Self::HIGHEST) => 0,
@@ -94,7 +93,6 @@ pub(crate) enum LinkState {
 /// A dialog above the view.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Dialog {
-    /// The help.
     Help,
     /// The choice of a motor state.
     ChooseState,
@@ -126,7 +124,7 @@ impl LinkQuality {
         }
     }
 
-    /// Damaged frames that the arm counted since the connection.
+    /// Damaged frames that the arm has counted since it was connected; 0 if it does not count them.
     pub(crate) fn damaged_at_arm(&self) -> u16 {
         self.corrupted.map_or(0, |(first, now)| now.wrapping_sub(first))
     }
@@ -141,7 +139,6 @@ pub(crate) struct MonitorView {
     pub(crate) sample: Option<ArmSample>,
     /// The samples of the last [`PLOT_SPAN`], oldest first.
     pub(crate) past: VecDeque<PastSample>,
-    /// What the plot shows.
     pub(crate) plot: PlotKind,
     /// The time at the right end of the plot.
     pub(crate) now: Duration,
@@ -182,7 +179,6 @@ impl MonitorView {
         }
     }
 
-    /// Applies an event.
     pub(crate) fn update(&mut self, event: ArmEvent) {
         match event {
             ArmEvent::Found { port, firmware } => {
@@ -247,7 +243,7 @@ pub(crate) mod tests {
         Snapshot { address: span.address(), values: vec![0; span.count().into()] }
     }
 
-    /// A sample with joint 2 moving from 90 to 120 degrees.
+    /// A sample in which joint 2 stands at `position` on its way to 120 degrees.
     pub(crate) fn sample(millis: u64, position: u8) -> ArmSample {
         let mut registers = zeros(JointSnapshot::REGISTERS);
         set(&mut registers, MOTOR_STATE.address, &[1]);
@@ -270,7 +266,7 @@ pub(crate) mod tests {
         }
     }
 
-    /// A view after 10 s of such samples.
+    /// A view after 100 samples in 10 s, in which joint 2 moves from 90 to 109 degrees.
     pub(crate) fn watching() -> MonitorView {
         let mut view = MonitorView::new("/dev/ttyUSB0", PlotKind::Position);
         view.update(ArmEvent::Found { port: "/dev/ttyUSB0".to_owned(), firmware: "3.0".to_owned() });

@@ -14,7 +14,7 @@ use crate::printer::Printable;
 #[derive(Debug, Serialize)]
 pub(super) struct TipArrival {
     asked_mm: [f64; 3],
-    /// The direction of the tool.
+    /// The requested direction of the tool, of any length.
     tool: [f64; 3],
     /// Joints 1 to 5.
     targets_degrees: TargetDegrees,
@@ -61,7 +61,7 @@ pub(super) struct MeasuredTip {
 }
 
 impl TipArrival {
-    /// A planned move.
+    /// A move that is planned and not made yet, with targets in whole degrees.
     pub(super) fn planned(tip: Vector, target: &TipTarget, direction: Vector) -> Self {
         Self {
             asked_mm: components(tip, 100.0),
@@ -75,7 +75,7 @@ impl TipArrival {
         }
     }
 
-    /// Replaces the targets by ones in hundredths of a degree.
+    /// Replaces the targets in whole degrees by targets in hundredths of a degree.
     pub(super) fn in_hundredths(self, target: &FineTipTarget) -> Self {
         Self {
             targets_degrees: TargetDegrees::Hundredths(target.angles.map(FineAngle::degrees)),

@@ -45,7 +45,7 @@ pub(super) fn run(session: &mut Session, args: &MoveToArgs) -> Result<(), Comman
 struct StraightMove {
     start_mm: [f64; 3],
     asked_mm: [f64; 3],
-    /// The direction of the tool at the end.
+    /// The direction of the tool at the end, of length 1.
     tool: [f64; 3],
     length_mm: f64,
     seconds: f64,
@@ -54,7 +54,7 @@ struct StraightMove {
     /// The largest distance from the line, due to rounded angles.
     deviation_mm: f64,
     tilt_degrees: f64,
-    /// The angle of joint 4 at the start of the line.
+    /// The angle to which joint 4 turns before the line starts, without moving tip or tool. `None` if it stays.
     first_turn_degrees: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     measured: Option<MeasuredTip>,

@@ -6,7 +6,8 @@
 //!    └── reads ───────▶ TelemetryReader (targets, velocities, loads, health) ───┘ MCAP only
 //! ```
 //!
-//! However the recording ends, the files hold whole moments only. A guided arm that is still connected holds its position.
+//! However the recording ends, the files hold whole moments only. Unless the program is killed, a guided arm that is still
+//! connected then holds its position.
 
 mod outputs;
 mod teach_pendant;
@@ -87,7 +88,7 @@ pub(crate) struct RecordArgs {
     yes: bool,
 }
 
-/// The longest reaction time to a key or Ctrl-C.
+/// The longest wait for a report. Then keys and Ctrl-C are checked again.
 const POLL_PERIOD: Duration = Duration::from_millis(20);
 
 /// The result of `record`.
@@ -185,7 +186,7 @@ fn check_names(args: &RecordArgs) -> Result<(), CommandError> {
     Err(CommandError::Usage(reason))
 }
 
-/// Switches the motors off if the user guides the arm.
+/// Switches the motors off if the user guides the arm; with --driven, writes motor state 1 (servo).
 fn set_motors(arm: &mut Arm, args: &RecordArgs) -> Result<(), CommandError> {
     let state = if args.driven { motor_state::SERVO } else { motor_state::FORCELESS };
     Ok(arm.write_motion(MOTOR_STATE.address, &[state])?)
@@ -205,7 +206,7 @@ fn hold_at_end(arm: &mut Arm, args: &RecordArgs) -> Result<(), CommandError> {
     Ok(())
 }
 
-/// Records reports until the end is requested.
+/// Records reports until a key, Ctrl-C or `--seconds` ends the recording.
 fn record_reports(
     arm: &mut Arm,
     args: &RecordArgs,

@@ -1,4 +1,4 @@
-//! Where a recording goes: a text file, an MCAP file, or both.
+//! The outputs of a recording: a text file, an MCAP file, or both.
 
 use std::fs::File;
 use std::io::{self, Write};
@@ -29,7 +29,7 @@ struct McapFile {
 }
 
 impl Outputs {
-    /// Creates the files, or empties them.
+    /// Creates the files, or empties existing ones, and writes their heads.
     pub(crate) fn create(
         text: Option<&Path>,
         mcap: Option<&Path>,
@@ -75,7 +75,6 @@ impl Outputs {
         self.mcap.as_mut().map_or(Ok(()), |file| file.write(|writer| writer.diagnose(at, health, port)))
     }
 
-    /// The number of moments.
     pub(crate) const fn count(&self) -> u64 {
         self.lines.count()
     }

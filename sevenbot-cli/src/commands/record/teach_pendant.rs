@@ -49,7 +49,6 @@ impl TeachPendant {
         self.vacuum
     }
 
-    /// Shows the progress.
     pub(crate) fn show(&self, moments: u64, time: Duration) {
         self.progress.set(moments);
         let seconds = time.as_secs_f64();

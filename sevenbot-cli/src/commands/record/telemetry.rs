@@ -1,4 +1,5 @@
-//! Reads targets, velocities, loads and health during a recording, as often as the line allows. The poses come from reports.
+//! Reads targets, velocities, loads and health during a recording: once for each report, or less often on a slow line. The
+//! poses come from the reports.
 
 use std::time::{Duration, Instant};
 
@@ -11,7 +12,7 @@ use sevenbot::{Angle, Arm, Error, FineAngle, Health, Snapshot, Span};
 const REGISTERS: Span = Span::between(&FINE_TARGET, &LOAD);
 /// Bits of a question and its answer on the line: 7 bytes each around the values, ten bits a byte.
 const BITS: u32 = 10 * (7 + 7 + REGISTERS.count() as u32);
-/// Reads take at most one part in this many of the line. The rest is for reports.
+/// Reads use the line for at most 1 / `SHARE_OF_LINE` of the time. The rest is for reports.
 const SHARE_OF_LINE: u32 = 2;
 /// The time between two reads of the health, which has more registers.
 const HEALTH_PERIOD: Duration = Duration::from_secs(1);

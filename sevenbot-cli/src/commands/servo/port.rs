@@ -41,7 +41,7 @@ pub(super) fn port(session: &Session) -> Result<String, CommandError> {
     Ok(port)
 }
 
-/// Opens the bus.
+/// Opens the adapter's port. `baud` is the rate of the servo bus.
 pub(super) fn open(session: &Session, baud: u32) -> Result<BusMaster, CommandError> {
     let port = port(session)?;
     let options = BusOptions { reply_timeout: session.options.reply_timeout, ..BusOptions::default() };

@@ -308,7 +308,7 @@ fn request(command: &SimCommand) -> Result<Value, CommandError> {
     })
 }
 
-/// Reads and checks the scene in a file. `off` stays `off`.
+/// Reads and checks the scene in a file. The name `off` is no file: it is returned as it is.
 fn scene(file: &Path) -> Result<String, CommandError> {
     if file == Path::new("off") {
         return Ok("off".to_owned());

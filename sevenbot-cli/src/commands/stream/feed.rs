@@ -18,23 +18,24 @@ pub(super) struct Feed {
 }
 
 impl Feed {
-    /// Adds a point, later than all before.
+    /// Adds a point. Its time must be later than the times of all earlier points.
     pub(super) fn push(&mut self, point: TimedPoint) {
         self.next.push_back(point);
     }
 
-    /// Are there no points whose time is still to come?
+    /// True if all points have been taken by [`Feed::take`].
     pub(super) fn is_empty(&self) -> bool {
         self.next.is_empty()
     }
 
-    /// When to go on after a pause: one period after the last point, or at the next one if that is earlier.
+    /// The time at which the stream goes on after a pause: one period after the last point, or at the next point if that is
+    /// earlier.
     pub(super) fn resume_time(&self, period: Duration) -> Duration {
         let next = self.next.front().map_or(Duration::ZERO, |next| next.time);
         self.last.map_or(next, |last| next.min(last.time + period))
     }
 
-    /// The set-point at this time; `None` if the input has no point yet, or none after the last one that was returned.
+    /// The set-point at this time; `None` if the input has no point yet, or no new one since the last point was returned.
     pub(super) fn take(&mut self, time: Duration) -> Option<FineTargets> {
         while let Some(point) = self.next.pop_front_if(|point| point.time <= time) {
             (self.last, self.is_last_taken) = (Some(point), false);

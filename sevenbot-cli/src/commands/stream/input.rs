@@ -12,7 +12,7 @@ use sevenbot::fine::FineTargets;
 
 use crate::printer::warn;
 
-/// Lines that may wait to be sent. Then the reading thread waits.
+/// The number of set-points that may wait to be sent. Then the reading thread pauses.
 const LINES_AHEAD: usize = 1_024;
 /// Later times are refused, so that the arithmetic cannot overflow.
 const LONGEST: Duration = Duration::from_secs(24 * 60 * 60);

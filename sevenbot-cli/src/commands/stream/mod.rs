@@ -159,7 +159,7 @@ fn refused(status: Option<StatusBlock>) -> u16 {
     status.as_ref().map_or(0, StatusBlock::frames_refused)
 }
 
-/// Streams all points, and waits until the arm has arrived. The second result is the reason if the input ended early.
+/// Streams all points, and waits until the arm has arrived. The second result is the error if a bad line ended the input.
 fn stream(
     arm: &mut Arm,
     interrupt: Interrupt,
@@ -220,7 +220,7 @@ struct StreamStart {
 }
 
 impl Streamer<'_, '_> {
-    /// Sends points until the input pauses; `false` at its end.
+    /// Sends points until the input pauses. Returns false at the end of the input.
     fn play(&mut self, interrupt: Interrupt) -> Result<bool, CommandError> {
         let Some(mut start) = self.wait_for_points(interrupt)? else { return Ok(false) };
         loop {
@@ -246,7 +246,7 @@ impl Streamer<'_, '_> {
         }
     }
 
-    /// Goes to the first point of joints that had none yet.
+    /// Approaches the first points of joints that have had no point before.
     fn approach(&mut self, first: &FineTargets, interrupt: Interrupt) -> Result<(), CommandError> {
         let standing = self.stream.arm().standing()?;
         let way = Approach::plan(&standing, first, self.start.rule).map_err(MoveError::from)?;
@@ -263,7 +263,7 @@ impl Streamer<'_, '_> {
         }
     }
 
-    /// Warns once if the guard would not allow the points of the stream.
+    /// Warns, once in a stream, if the guard would not allow the last point.
     fn warn_of_pose(&mut self) {
         let [t1, t2, t3, t4, t5, ..] = self.tracking.pose();
         if let Some(breach) = self.guard.and_then(|guard| guard.check_pose([t1, t2, t3, t4, t5]).err()) {
@@ -297,7 +297,8 @@ impl Streamer<'_, '_> {
         take_reports_until(&mut self.stream, self.tracking, end, interrupt)
     }
 
-    /// Waits until the joints stand at the last points. Fails if one does not get there, or if one without points is elsewhere.
+    /// Waits until the joints stand at the last points. Fails if a joint does not get there, or if the target of a joint
+    /// has changed: it has to be the last point of the joint, or the target at the start if the joint had no point.
     fn wait_until_arrived(&mut self, interrupt: Interrupt) -> Result<(), CommandError> {
         let Self { stream, tracking, .. } = self;
         stream.wait_until_arrived(|stream, end| take_reports_until(stream, tracking, end, interrupt))?;

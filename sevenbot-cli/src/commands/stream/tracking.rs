@@ -8,7 +8,7 @@ use sevenbot::fine::FineTargets;
 
 /// How long points are kept: longer than the largest delay, 1.5 periods of 1 s.
 const KEPT: Duration = Duration::from_secs(2);
-/// A target this far from the last point was written by another program, in degrees.
+/// In degrees. A target that is farther than this from the last point was not written by this stream.
 const ELSEWHERE: f64 = 3.0;
 
 /// The points that were sent, and the errors so far.
@@ -64,7 +64,7 @@ impl Tracking {
         joints.into_iter().find(|(_, from, to)| (from - to).abs() > ELSEWHERE)
     }
 
-    /// Adds measured positions.
+    /// Adds the error of measured positions, if it is known which pose was due.
     pub(super) fn add_measured(&mut self, received: Instant, positions: &FineTargets) {
         let Some(expected) = received.checked_sub(self.delay).and_then(|time| self.at(time)) else { return };
         for ((expected, measured), joint) in expected.iter().zip(positions).zip(1..) {

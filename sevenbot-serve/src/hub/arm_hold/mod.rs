@@ -8,9 +8,9 @@
 //!               (`holding`)
 //! ```
 //!
-//! A joint that has reached its target keeps it ([D24](protocol_core::decisions#d24)). Its load draws it some tenths of a degree
-//! off its target: with its position as the new target it would sink by as much in each hold. A joint that still brakes after a stop
-//! or a hold keeps its target, too ([`HeldTargets`]).
+//! A joint that has reached its target keeps it ([D24](protocol_core::decisions#d24)). Its load draws it some tenths of a
+//! degree off its target: if its position became its target, it would sink by as much again in each hold. A joint that still
+//! brakes after a stop or a hold keeps its target, too ([`HeldTargets`]).
 
 use host_link::keep_limits;
 use protocol_core::registers::map::{
@@ -122,7 +122,7 @@ impl ArmHold {
         self.held_meanwhile = held.fold(self.held_meanwhile, |bits, (joint, _)| bits | joint.bit());
     }
 
-    /// The registers to read now, and how many.
+    /// The read that is due: the first register, and how many. `None` if no read is due.
     pub(crate) fn next_read(&mut self, now: Instant) -> Option<(u8, u8)> {
         if now < self.due() {
             return None;
@@ -246,7 +246,8 @@ impl ArmHold {
         joined(wanted.filter_map(|(joint, wanted)| Some((targets.of(joint), self.bytes(wanted?)))))
     }
 
-    /// The target that holds a joint already, if it is the one that was read, or one that a client wrote meanwhile.
+    /// The target of a stop or a hold near this position, if the arm still has it (`read`), or if a client wrote it after
+    /// the read was sent. The joint then keeps it.
     fn held_target(&self, joint: Joint, position: u16, read: Option<u16>, held: &HeldTargets) -> Option<u16> {
         let is_newer = self.held_meanwhile & joint.bit() != 0;
         held.near(joint, position).filter(|&target| is_newer || Some(target) == read)

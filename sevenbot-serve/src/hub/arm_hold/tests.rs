@@ -5,7 +5,8 @@ use super::*;
 
 const NOW: Instant = Instant::ZERO;
 
-/// The bytes 1 to 14 as targets, and positions. The position of joint 3 was not measured.
+/// The values from register 128 on: the bytes 1 to 14 as targets, and the bytes 21 to 32 as positions. Joint 3 was not
+/// measured.
 fn values() -> Vec<u8> {
     let mut values: Vec<u8> = (1..15).collect();
     values.extend([21, 22, 23, 24, 0xFF, 0xFF, 25, 26, 27, 28, 29, 30, 31, 32]);

@@ -1,4 +1,4 @@
-//! The port by its descriptor.
+//! The port by its file descriptor, whose readiness the system reports.
 
 use std::io;
 use std::path::Path;

@@ -2,7 +2,7 @@
 
 #[cfg(target_os = "linux")]
 mod descriptor;
-// The tests try it on Linux.
+// The tests use this module on Linux, too.
 #[cfg(any(test, not(target_os = "linux")))]
 mod threads;
 
