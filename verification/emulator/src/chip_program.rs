@@ -1,4 +1,4 @@
-//! The paths of the linked programs for the chip.
+//! The linked programs for the chip, and the paths at which Cargo puts them.
 
 use std::path::{Path, PathBuf};
 use std::{env, fs};
@@ -14,7 +14,7 @@ pub fn root() -> &'static Path {
     here.ancestors().nth(2).unwrap_or(here)
 }
 
-/// Cargo's target directory.
+/// Cargo's target directory: `CARGO_TARGET_DIR`, relative to the workspace, or `target`.
 #[must_use]
 pub fn target_directory() -> PathBuf {
     env::var_os("CARGO_TARGET_DIR").map_or_else(|| root().join("target"), |set| root().join(set))
@@ -23,14 +23,14 @@ pub fn target_directory() -> PathBuf {
 /// A linked program for the chip.
 #[derive(Debug)]
 pub struct ChipProgram {
-    /// Its name.
+    /// The name of its binary target.
     pub name: &'static str,
-    /// Its build profile.
+    /// Its build profile, which is also the name of its folder in the target directory.
     pub profile: &'static str,
 }
 
 impl ChipProgram {
-    /// The path of the file.
+    /// The path of the linked ELF file.
     #[must_use]
     pub fn path(&self) -> PathBuf {
         target_directory().join(CHIP).join(self.profile).join(self.name)

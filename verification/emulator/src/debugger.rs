@@ -1,4 +1,4 @@
-//! The emulator's debugger interface: GDB's remote serial protocol, as far as breakpoints and jumps need it.
+//! A client of the emulator's debugger interface: the commands of GDB's remote serial protocol that this crate needs.
 //!
 //! ```text
 //!   $data#checksum      both directions; the other end acknowledges with +
@@ -17,10 +17,10 @@ pub struct Debugger {
 }
 
 impl Debugger {
-    /// Connects to the emulator's socket for a debugger, which stops the chip.
+    /// Connects to the emulator's debugger socket. The connection stops the chip.
     ///
     /// # Errors
-    /// The socket does not open.
+    /// The socket does not open within [`TIMEOUT`].
     pub fn connect(socket: &Path) -> TaskResult<Self> {
         let stream =
             wait_for("the emulator opens its debugger socket", || Ok(UnixStream::connect(socket).ok()))?;
@@ -41,7 +41,7 @@ impl Debugger {
         self.execute("s").map(|_| ())
     }
 
-    /// Runs until a breakpoint. A chip that is stopped at one has to step first.
+    /// Runs the chip until it reaches a breakpoint. If the chip stands at a breakpoint, call [`Self::step`] first.
     pub(crate) fn run(&mut self) -> TaskResult {
         self.execute("c").map(|_| ())
     }
@@ -53,10 +53,10 @@ impl Debugger {
         Ok(word.swap_bytes())
     }
 
-    /// Detaches the debugger, and lets the chip continue at another instruction.
+    /// Sets the program counter to `address`, detaches the debugger, and lets the chip run.
     ///
     /// # Errors
-    /// The emulator refuses to set the program counter, or has ended.
+    /// The emulator refuses to set the program counter, does not reply within [`TIMEOUT`], or has ended.
     pub fn continue_at(mut self, address: u32) -> TaskResult {
         self.answer("qSupported")?;
         // The emulator allows writes of registers only to a debugger that has read its description of the chip.

@@ -24,7 +24,7 @@ const REPLY_PERIOD: Duration = Duration::from_millis(1);
 
 /// The image and its servos.
 pub struct EmulatedArm {
-    /// The servos.
+    /// The simulated servos with their load.
     pub plant: Plant,
     machine: Machine,
     bus: UnixStream,
@@ -33,7 +33,7 @@ pub struct EmulatedArm {
 }
 
 impl EmulatedArm {
-    /// Switches an arm on.
+    /// Starts the image and its servos, and waits until the image receives host bytes. Collisions of the arm are ignored.
     pub fn start() -> TaskResult<Self> {
         let (mut machine, bus) = Machine::start_with_bus(tempfile::tempdir()?, &[])?;
         machine.host.set_nonblocking(true)?;
@@ -45,18 +45,18 @@ impl EmulatedArm {
         Ok(Self { plant, machine, bus, clock, now })
     }
 
-    /// The current time of the servos.
+    /// The time of the last exchange with the servo bus.
     #[must_use]
     pub const fn now(&self) -> Instant {
         self.now
     }
 
-    /// Sends a request.
+    /// Sends a request without waiting for a reply.
     pub fn request(&mut self, request: Request<'_>) -> TaskResult {
         Ok(self.machine.host.write_all(&frame(request))?)
     }
 
-    /// Reads a register.
+    /// Reads a register through the host link, and runs the servos until the reply arrives.
     pub fn register(&mut self, address: u8) -> TaskResult<u8> {
         self.request(Request::Read { address, count: 1 })?;
         let mut received = Vec::new();
@@ -80,7 +80,7 @@ impl EmulatedArm {
         Err(format!("no reply to a read of register {address}"))?
     }
 
-    /// Runs the servos for this time, and calls `sample` after each exchange with the servo bus.
+    /// Runs the servos for this real time, and calls `sample` after each exchange with the servo bus.
     pub fn run(&mut self, time: Duration, mut sample: impl FnMut(&Plant)) -> TaskResult {
         let until = self.clock.now() + time;
         loop {
@@ -94,12 +94,12 @@ impl EmulatedArm {
         }
     }
 
-    /// Restarts the chip alone.
+    /// Restarts the chip. The servos keep their power.
     pub fn reset(&mut self) -> TaskResult {
         self.machine.reset()
     }
 
-    /// Stops the chip. The servos go on.
+    /// Stops the chip. The servos continue during [`Self::run`].
     pub fn stop(&mut self) -> TaskResult {
         self.machine.monitor.execute("stop", "")
     }
@@ -109,7 +109,7 @@ impl EmulatedArm {
         self.machine.monitor.execute("cont", "")
     }
 
-    /// Lets the chip continue at another instruction.
+    /// Lets the chip continue at the instruction at `address`.
     pub fn jump_to(&mut self, address: u32) -> TaskResult {
         self.machine.debugger()?.continue_at(address)
     }

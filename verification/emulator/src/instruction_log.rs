@@ -1,4 +1,4 @@
-//! The emulator's log of executed instructions, while it is switched on.
+//! Switches the emulator's log of executed instructions on and off, and parses the log.
 
 use std::fs::{self, File};
 use std::io::{Read, Seek, SeekFrom};
@@ -17,7 +17,7 @@ pub(crate) struct InstructionLog {
 }
 
 impl InstructionLog {
-    /// A log in the folder of an emulator.
+    /// The log of the emulator whose files are in `folder`. The log is off.
     pub(crate) fn new(folder: &TempDir) -> Self {
         Self { path: folder.path().join("log"), begin: 0 }
     }
@@ -27,13 +27,13 @@ impl InstructionLog {
         ["-icount", clock, "-singlestep", "-D", &self.path.display().to_string()].map(str::to_owned)
     }
 
-    /// Begins to log.
+    /// Switches the log on.
     pub(crate) fn begin(&mut self, monitor: &mut Monitor) -> TaskResult {
         self.begin = fs::metadata(&self.path).map_or(0, |log| log.len());
         monitor.human("log exec,nochain")
     }
 
-    /// Stops the log, and returns the events since `begin`.
+    /// Switches the log off, empties the file, and returns the events since `begin`.
     pub(crate) fn end(&self, monitor: &mut Monitor) -> TaskResult<Vec<TraceEvent>> {
         monitor.human("log none")?;
         let mut file = File::options().read(true).write(true).open(&self.path)?;

@@ -42,7 +42,6 @@ use relay::Relay;
 
 pub use machine::{QEMU, qemu};
 
-/// Instructions for the installation.
 const HOW_TO_GET_QEMU: &str =
     "`sudo apt-get install qemu-system-arm` installs it on Debian and Ubuntu, `brew install qemu` on a Mac";
 
@@ -72,7 +71,8 @@ pub struct EmulateArgs {
     pub no_build: bool,
 }
 
-/// Runs the image until a signal ends it. SIGHUP switches the arm off and on, SIGUSR2 resets the chip alone.
+/// Runs the image until a signal ends it. Prints `ready` and the path of the port when the image receives host bytes. SIGHUP
+/// switches the arm off and on, SIGUSR2 resets the chip alone.
 pub fn run(options: &EmulateArgs) -> TaskResult {
     need_qemu()?;
     let mut signals = Signals::catch()?;
@@ -125,7 +125,7 @@ pub fn need_qemu() -> TaskResult {
     Err(format!("{QEMU} is missing: {HOW_TO_GET_QEMU}, or let `cargo xtask test` install it"))?
 }
 
-/// Starts the seven servos on a socket. They write their true angles to `angles`.
+/// Starts `host-sim` with the seven servos on a socket in `folder`. `angles` is the file for the true angles of the joints.
 fn start_servos(folder: &TempDir, faults: &[String], angles: Option<&Path>) -> TaskResult<ChildProcess> {
     let mut command = Command::new(target_directory().join("debug").join("host-sim"));
     command.arg("--quiet").arg("--servo-socket").arg(folder.path().join("servos"));

@@ -6,8 +6,8 @@
 //!
 //! Virtual time stands still during a stop, so the time of this process does not count. An instruction takes 8 ns. The
 //! image sleeps in real time: a busy computer may end a sleep late, and then a tick is late or lost. A byte arrives only
-//! at a stop, so a frame or an answer is up to one tick, 1 ms, late. Then its bytes follow each other, each with its own
-//! interrupt.
+//! at a stop, so the first byte of a frame is up to one tick, 1 ms, late. The next bytes arrive one per stop, each with its
+//! own interrupt.
 
 use std::collections::VecDeque;
 use std::io::{ErrorKind, Read, Write};
@@ -35,7 +35,7 @@ const RXNE: u32 = 1 << 5;
 
 /// The image, its lines and its servos.
 pub struct Lockstep<B> {
-    /// The servo bus.
+    /// The simulated servos behind the servo bus.
     pub bus: B,
     debugger: Debugger,
     machine: Machine,

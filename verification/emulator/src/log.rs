@@ -4,8 +4,8 @@
 //!   _SEGGER_RTT: │ name: 16 bytes │ channels up, down │ name │ buffer │ size │ written to │ read to │ flags │
 //! ```
 //!
-//! No debugger advances "read to" here, and the firmware does not wait for it. So the log loses a burst that exceeds the
-//! buffer between two polls.
+//! No debugger advances "read to" here, and the firmware does not wait for it. If the firmware writes more than the
+//! buffer holds between two polls, log entries are lost.
 
 use std::io::Write;
 use std::path::Path;
@@ -20,7 +20,7 @@ use crate::process::{ChildProcess, TaskResult};
 /// Bytes of the control block with its first channel.
 const CONTROL_BLOCK: u32 = 48;
 
-/// The reader of the log.
+/// Copies the log from the chip's memory to the input of defmt-print.
 pub(crate) struct Log {
     control_block: u32,
     printed_to: usize,

@@ -1,5 +1,5 @@
-//! The image in the emulator, one instruction at a time, with an optional log. Virtual time depends on instructions only, so
-//! the log does not affect the arm.
+//! The image in the emulator, one instruction at a time, with an optional log. While the image executes instructions, virtual
+//! time depends on their number only, so the log does not affect the arm.
 
 use std::io::{Read, Write};
 use std::thread::sleep;
@@ -29,7 +29,7 @@ pub struct LoggedImage {
 }
 
 impl LoggedImage {
-    /// Starts the image with seven servos, and waits until its arm is in its pose.
+    /// Starts the image with seven servos, and waits until all servos answer.
     pub fn with_servos() -> TaskResult<Self> {
         let folder = tempfile::tempdir()?;
         let servos = start_servos(&folder, &[], None)?;
@@ -45,7 +45,7 @@ impl LoggedImage {
         Ok(image)
     }
 
-    /// Starts the image without connections. Virtual time does not wait for real time, so every run executes the same
+    /// Starts the image without servos. Virtual time does not wait for real time, so every run executes the same
     /// instructions.
     pub fn alone() -> TaskResult<Self> {
         Self::start(tempfile::tempdir()?, None, "null", "shift=0,sleep=off")
@@ -60,7 +60,7 @@ impl LoggedImage {
         Ok(Self { machine, log, _servos: servos })
     }
 
-    /// Sends bytes to the arm, and waits until it sleeps.
+    /// Sends bytes to the arm, and waits 20 ms. By then the arm has usually processed them and sleeps.
     pub fn send(&mut self, bytes: &[u8]) -> TaskResult {
         self.machine.host.write_all(bytes)?;
         sleep(IDLE_TIME);
@@ -76,7 +76,7 @@ impl LoggedImage {
         })
     }
 
-    /// Waits for a reply with this many values.
+    /// Waits for a reply with `count` values, and returns the values.
     pub fn reply(&mut self, count: u8) -> TaskResult<Vec<u8>> {
         let mut reply = vec![0; 7 + usize::from(count)];
         self.machine.host.read_exact(&mut reply).map_err(|why| format!("the arm does not reply: {why}"))?;
@@ -100,7 +100,7 @@ impl LoggedImage {
                 .map_err(|why| format!("the arm does not reply: {why}"))?;
             let [.., count] = head;
             self.machine.host.read_exact(&mut vec![0; usize::from(count) + 2])?;
-            // Replies have the order of their requests (D5), and only this one is empty.
+            // Replies have the order of their requests (D5), and only the reply to this request is empty.
             if count == 0 {
                 return Ok(());
             }

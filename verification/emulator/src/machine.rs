@@ -19,7 +19,7 @@ use crate::process::{ChildProcess, TaskResult};
 
 /// The name of the emulator's program, and of its package on Debian and Ubuntu.
 pub const QEMU: &str = "qemu-system-arm";
-/// USART1's first control register (RM0090, section 30.6). Bytes before its setup are lost.
+/// USART1's first control register (RM0090, section 30.6). Bytes that arrive before the setup of USART1 are lost.
 const HOST_LINK_CONTROL: u32 = 0x4001_100C;
 /// The bits UE and RE of this register.
 const RECEIVER_ON: u32 = 1 << 13 | 1 << 2;
@@ -60,7 +60,7 @@ impl Machine {
         Ok(Self { monitor, host, _child: child, folder })
     }
 
-    /// Starts the image for the arm, with servos in this process. Returns the end of their bus.
+    /// Starts the image for the arm. Returns this process's end of the servo bus, too, for servos in this process.
     pub(crate) fn start_with_bus(folder: TempDir, options: &[&str]) -> TaskResult<(Self, UnixStream)> {
         let bus = listen(&folder, "servos")?;
         let servos = servo_socket(&folder);
@@ -80,7 +80,7 @@ impl Machine {
         self.monitor.execute("system_reset", "")
     }
 
-    /// Connects a debugger, which stops the chip.
+    /// Connects a debugger. The connection stops the chip.
     pub(crate) fn debugger(&self) -> TaskResult<Debugger> {
         Debugger::connect(&self.folder.path().join("debugger"))
     }

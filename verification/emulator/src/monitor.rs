@@ -1,4 +1,4 @@
-//! The emulator's monitor (QMP). A command and a reply are a line of JSON each, with events in between.
+//! A client of the emulator's monitor (QMP). Each command, reply and event is one line of JSON.
 
 use std::fs;
 use std::io::{BufRead, BufReader, Write};

@@ -1,14 +1,14 @@
-//! Processes and waits of a task.
+//! Child processes, waits and errors of the tasks that run the emulator.
 
 use std::error::Error;
 use std::process::Child;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-/// The result of a task. An error tells what to do.
+/// The result of a task. The text of the error is printed for the user.
 pub type TaskResult<T = ()> = Result<T, Box<dyn Error>>;
 
-/// The timeout of all waits. It is long, because the machine may be busy.
+/// The timeout of [`wait_for`] and of a read from the emulator's sockets. It is long, because the machine may be busy.
 pub const TIMEOUT: Duration = Duration::from_secs(60);
 
 /// Polls until there is a value.

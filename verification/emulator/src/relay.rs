@@ -13,9 +13,9 @@ use tty_ports::pty::Pty;
 
 use crate::process::TaskResult;
 
-/// The largest number of bytes in one read. The port is not read while bytes wait for the emulator.
+/// The largest number of bytes in one read. Neither side is read while earlier bytes from it still wait for the other side.
 const CAPACITY: usize = 4_096;
-/// The poll period of other tasks, such as the firmware's log.
+/// The longest sleep while the firmware's log is printed, because the log has to be polled.
 const POLL_PERIOD: Timespec = Timespec { tv_sec: 0, tv_nsec: 50_000_000 };
 
 /// A port and the socket behind it.
@@ -28,7 +28,7 @@ pub(crate) struct Relay {
 }
 
 impl Relay {
-    /// Opens a port for the other end of the socket.
+    /// Opens a port for the emulator at the other end of `socket`.
     pub(crate) fn new(socket: UnixStream) -> io::Result<Self> {
         socket.set_nonblocking(true)?;
         let mut clients = Clients::new().inspect_err(Pty::warn_of).ok();
@@ -41,7 +41,7 @@ impl Relay {
         self.port.path()
     }
 
-    /// Transfers the available bytes.
+    /// Transfers the available bytes in both directions, and updates the clients of the port.
     pub(crate) fn transfer(&mut self) -> TaskResult {
         let mut bytes = [0; CAPACITY];
         if self.to_arm.is_empty() {
@@ -69,7 +69,8 @@ impl Relay {
         Ok(())
     }
 
-    /// Sleeps until there are bytes, a client or a signal; at most for the poll period if `polls`.
+    /// Sleeps until bytes can be transferred, a client opens or closes the port, or a signal arrives. If `polls`, sleeps at most
+    /// for [`POLL_PERIOD`].
     pub(crate) fn sleep(&self, signals: &Signals, polls: bool) -> io::Result<()> {
         let if_empty = |bytes: &[u8], flags| if bytes.is_empty() { flags } else { PollFlags::empty() };
         let if_waiting = |bytes: &[u8], flags| if bytes.is_empty() { PollFlags::empty() } else { flags };
@@ -90,7 +91,7 @@ impl Relay {
     }
 }
 
-/// `None` if the operation would block.
+/// `None` if the operation would block or was interrupted.
 fn if_ready(outcome: io::Result<usize>) -> io::Result<Option<usize>> {
     match outcome {
         Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => Ok(None),

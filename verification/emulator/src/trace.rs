@@ -1,4 +1,4 @@
-//! Parses the emulator's log of `-singlestep -d exec`.
+//! Parses the emulator's log of executed instructions (`-singlestep`, `log exec`) and of accesses to peripherals.
 //!
 //! ```text
 //!   Trace 0: 0x7f81a8 [00800409/0800c096/00000010/ff020201] USART1    about to execute; bit 0: in a handler
@@ -79,17 +79,17 @@ pub fn steps(events: &[TraceEvent]) -> u64 {
     events.iter().filter(|event| matches!(event, TraceEvent::Step { .. })).count() as u64
 }
 
-/// True if this is the execution of the instruction at `address`.
+/// True if `event` is the execution of the instruction at `address`.
 pub fn is_step_at(event: &TraceEvent, address: u64) -> bool {
     matches!(event, TraceEvent::Step { at, .. } if *at == address)
 }
 
-/// The number of these accesses to a register.
+/// The number of events that are equal to `access`.
 pub fn times(events: &[TraceEvent], access: TraceEvent) -> usize {
     events.iter().filter(|event| **event == access).count()
 }
 
-/// The ranges of events that begin with a mark and end before the next one.
+/// The ranges of events that begin with a mark and end before the next mark. The events after the last mark are left out.
 pub fn between(events: &[TraceEvent], is_mark: impl Fn(&TraceEvent) -> bool) -> Vec<Range<usize>> {
     let marks: Vec<_> =
         events.iter().enumerate().filter(|(_, event)| is_mark(event)).map(|(at, _)| at).collect();
@@ -110,8 +110,8 @@ pub fn handler_calls<'a>(
     calls.filter(|call| !call.iter().skip(1).any(is_entry)).collect()
 }
 
-/// The events from the first instruction of a function to its return, with the functions that it calls; `None` if it does
-/// not return.
+/// The events from the first instruction of a function to its return, with the functions that it calls; `None` if
+/// `events` end before it returns.
 fn call<'a>(events: &'a [TraceEvent], effects: &HashMap<u64, Effect>) -> Option<&'a [TraceEvent]> {
     let mut depth = 0_u32;
     let end = events.iter().position(|event| {

@@ -1,6 +1,6 @@
-//! A data cache in front of the cells. It loads whole lines, and a write updates both the cells and the line.
+//! A data cache in front of the cells. A read loads a whole line. A write updates the cells and, if its line is loaded, the line.
 //!
-//! So a line shows the written value even if the cells did not change. To verify a write, flush the cache before the read.
+//! So a loaded line shows the written value even if the cells did not change. To verify a write, flush the cache before the read.
 
 use std::collections::VecDeque;
 

@@ -18,7 +18,7 @@ pub enum Operation {
 /// A future power cut.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Cut {
-    /// Number of operations that complete before the cut.
+    /// Number of operations that complete before the cut, from the call of [`Flash::cut_power`] on.
     pub after: usize,
     /// The result if the cut interrupts a program operation.
     pub program: ProgramTear,
@@ -40,7 +40,7 @@ struct Bits {
 pub struct Flash<const SECTOR: usize, const WORD: usize = 4> {
     /// The present contents.
     cells: Vec<u8>,
-    /// The value with which each word was programmed since its sector was erased; all ones if it was not.
+    /// The value that was requested for each word since the last erase of its sector; all ones if none was.
     requested: Vec<u8>,
     /// Bits that may read differently after the next power-up.
     marginal: Vec<Bits>,
@@ -86,7 +86,7 @@ impl<const SECTOR: usize, const WORD: usize> Flash<SECTOR, WORD> {
         }
     }
 
-    /// A flash with these contents that accepts every operation and changes nothing.
+    /// A flash with these contents that accepts every valid program and erase, and changes nothing.
     #[must_use]
     pub fn inert(bytes: &[u8]) -> Self {
         Self { inert: true, ..Self::holding(bytes) }
@@ -163,7 +163,7 @@ impl<const SECTOR: usize, const WORD: usize> Flash<SECTOR, WORD> {
         self.worn_out |= 1 << sector;
     }
 
-    /// Records an operation. Returns the cut if it interrupts this operation.
+    /// Records an operation. If the planned cut interrupts it, switches the power off and returns the cut.
     fn step(&mut self, operation: Operation) -> Option<Cut> {
         let cut = self.cut.filter(|cut| cut.after == 0);
         if let Some(cut) = &mut self.cut {

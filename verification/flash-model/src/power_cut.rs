@@ -15,15 +15,15 @@ pub(crate) struct Torn {
     pub(crate) marginal: u32,
 }
 
-/// How a power cut interrupts the programming of a word, which clears bits. Only [`ProgramTear::Disturbed`] affects other
-/// bits than those to be cleared.
+/// How a power cut interrupts the programming of a word. Programming clears bits. Only [`ProgramTear::Disturbed`] affects bits
+/// that are not to be cleared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ProgramTear {
     /// The cut comes before the operation: nothing changes.
     Nothing,
     /// The operation is complete, but it is not reported.
     All,
-    /// Only this many bytes are programmed.
+    /// Only this many bytes are programmed, from the lowest address on.
     Bytes(u32),
     /// A random part of the bits is programmed.
     RandomBits,
@@ -89,7 +89,7 @@ impl ProgramTear {
     }
 }
 
-/// How a power cut interrupts the erase of a sector, which sets bits. An erase that has begun removes all earlier marginal
+/// How a power cut interrupts the erase of a sector. An erase sets bits. An erase that has begun removes all earlier marginal
 /// bits of the sector.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum EraseTear {

@@ -37,7 +37,7 @@ impl Random {
         self.next().checked_rem(limit).unwrap_or(0)
     }
 
-    /// An index below `limit`.
+    /// An index below `limit`; 0 if `limit` is 0.
     pub fn index(&mut self, limit: usize) -> usize {
         usize::try_from(self.below(limit as u64)).unwrap_or(0)
     }

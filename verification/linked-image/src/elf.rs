@@ -18,7 +18,7 @@ type SourceLines<'data> = addr2line::Context<EndianSlice<'data, LittleEndian>>;
 
 /// A linked program.
 pub struct Program<'data> {
-    /// Functions and data with a name and a size.
+    /// Functions and data with a name. The size of some is 0: see [`Self::functions`].
     pub symbols: Vec<Symbol>,
     /// The sections in the chip's memory.
     pub sections: Vec<Section>,
@@ -32,7 +32,7 @@ pub struct Program<'data> {
 
 /// A function or a piece of data.
 pub struct Symbol {
-    /// Its name in the source.
+    /// Its demangled name, without the hash.
     pub name: String,
     /// Its address.
     pub address: u64,
@@ -84,7 +84,7 @@ impl<'data> Program<'data> {
         })
     }
 
-    /// The addresses of the calls and jumps to `target`.
+    /// The addresses of the direct calls and jumps to `target`.
     pub fn calls_to(&self, target: u64) -> Vec<u64> {
         let leads_there = |effect| matches!(effect, Effect::Call(to) | Effect::Jump(to) if to == target);
         let calls = self.instructions.iter().filter(|&(_, &effect)| leads_there(effect));
@@ -248,7 +248,8 @@ fn code<'data>(elf: &ElfFile32<'data>) -> ReadResult<Vec<CodeSection<'data>>> {
         .collect()
 }
 
-/// The starts of instructions (true) and data, in order: the mapping symbols of the ELF for the ARM architecture.
+/// The addresses at which instructions (true) or data (false) begin, in ascending order, from the mapping symbols of the ELF
+/// for the ARM architecture.
 fn marks(elf: &ElfFile32<'_>) -> Vec<(u64, bool)> {
     let mut marks: Vec<_> = elf
         .symbols()

@@ -7,7 +7,7 @@
 //!                                                          table: B.W, B.W, ...
 //! ```
 //!
-//! The compiler checks the index before it jumps. Any other indirect jump has no known targets.
+//! The compiled code checks the index before the jump. Any other indirect jump has no known targets.
 
 use yaxpeax_arm::armv7::{ConditionCode, Instruction, Opcode, Operand, RegShiftStyle, ShiftStyle};
 
@@ -24,7 +24,7 @@ pub(crate) struct FunctionCode<'a> {
 }
 
 const PC: u8 = 15;
-/// The number of instructions before a jump that are searched for the computation of its target.
+/// How many instructions before the use of a register are searched for the instruction that writes the register.
 const MOST_BETWEEN: usize = 8;
 
 impl FunctionCode<'_> {
@@ -40,7 +40,7 @@ impl FunctionCode<'_> {
         (are_code && !targets.is_empty()).then_some(targets)
     }
 
-    /// The table after TBB or TBH: from the end of the instruction to the next one.
+    /// The table after TBB or TBH: the bytes from the end of this instruction to the next instruction.
     fn table_behind(&self, at: u64) -> Option<&[u8]> {
         let is_relative_to_pc = match self.instruction(at)?.operands.first()? {
             Operand::RegDerefPreindexReg(base, ..) | Operand::RegDerefPreindexRegShift(base, ..) => {
@@ -74,7 +74,7 @@ impl FunctionCode<'_> {
         Some(entries.take_while(|&entry| self.is_long_branch(entry)).collect())
     }
 
-    /// The last instruction before `at` that writes `register`, its first operand. Other instructions may stand between.
+    /// The last of the [`MOST_BETWEEN`] instructions before `at` that has `register` as its first operand.
     fn last_write(&self, register: u8, at: u64) -> Option<u64> {
         let end = self.instructions.binary_search(&at).ok()?;
         let near = self.instructions.get(end.saturating_sub(MOST_BETWEEN)..end)?;
@@ -107,7 +107,8 @@ impl FunctionCode<'_> {
 
 /// `ADR rN, table`: the table's address.
 fn address_of_table(at: u64, instruction: &Instruction) -> Option<u64> {
-    // PC reads as the address of this instruction plus 4, rounded down to a word (A4.2.1).
+    // PC reads as the address of this instruction plus 4, rounded down to a word (ARMv7-M reference
+    // manual, A4.2.1).
     let pc = (at + 4) & !3;
     match (instruction.opcode, instruction.operands) {
         (Opcode::ADR, [_, Operand::Imm32(offset), ..]) => Some(pc + u64::from(offset)),
@@ -145,7 +146,8 @@ mod tests {
 
     const START: u64 = 0x0800_1000;
 
-    /// The targets of the jump at index `jump` of the halfwords, relative to the start. `data` are indices of halfwords.
+    /// The targets of the jump at index `jump` of the halfwords, in bytes from the start. The halfwords with an index in `data`
+    /// are no instructions.
     fn targets(code: &[u16], jump: u64, data: std::ops::Range<u64>) -> Option<Vec<u64>> {
         let bytes: Vec<_> = code.iter().flat_map(|half| half.to_le_bytes()).collect();
         let mut instructions = Vec::new();

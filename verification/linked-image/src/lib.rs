@@ -21,5 +21,5 @@ pub use loaded::{LoadedRange, loaded_ranges};
 pub use stack::{CallGraph, Depth};
 pub use thumb_decode::Effect;
 
-/// The result of reading a program. An error says what the program lacks.
+/// The result of reading a program. An error says what is missing or cannot be analyzed.
 pub type ReadResult<T> = Result<T, Box<dyn Error>>;

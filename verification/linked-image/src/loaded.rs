@@ -15,8 +15,8 @@ pub struct LoadedRange {
     pub bytes: Vec<u8>,
 }
 
-/// The ranges that the ELF file of a program writes to the flash, by address. Initial values of static data have their
-/// addresses in the flash, not in RAM.
+/// The ranges that the ELF file of a program writes to the flash, in ascending order of address. Initial values of
+/// static data have their addresses in the flash, not in RAM.
 ///
 /// # Errors
 /// The file is not a 32-bit ELF file, or a segment lies outside it.

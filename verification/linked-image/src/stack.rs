@@ -1,7 +1,7 @@
 //! The largest stack of a program for the chip, from the file that is flashed: pushes, calls and exceptions.
 //!
-//! The result is an upper bound, because all pushes of a function count, on any path. Recursion, calls through a pointer, and
-//! a stack that grows in a loop are refused.
+//! The result is an upper bound, because all pushes of a function count, on any path. Recursion, calls through a pointer,
+//! unknown instructions, and a stack that grows in a loop are refused.
 
 use std::collections::BTreeMap;
 
@@ -15,11 +15,12 @@ const EXCEPTION_FRAME: u64 = 27 * 4;
 /// Functions that set the stack pointer, to the top of the stack.
 const SETS_STACK: &[&str] = &["Reset", "HardFault"];
 
-/// The logger panics if a log frame begins inside another. This call closes a cycle, because the panic handler logs. The
-/// handler logs only when it is entered for the first time (`crash.rs`, `ENTERED`), so the cycle is executed once.
+/// Calls that are left out: from each of these functions of the logger to the panic. The logger panics if a log frame begins
+/// inside another, and the panic handler logs, so these calls close a cycle. The handler logs only when it is entered for the
+/// first time (`crash.rs`, `ENTERED`), so the cycle is executed once.
 const GUARDS: (&[&str], &str) = (&["_defmt_acquire", "_defmt_release"], "core::panicking::panic_fmt");
 
-/// The stack of a function and its callees.
+/// The largest stack of a function with its callees.
 #[derive(Clone, Default)]
 pub struct Depth {
     /// Its size in bytes.
@@ -40,7 +41,7 @@ struct StackFunction<'a> {
 pub struct CallGraph<'a>(BTreeMap<u64, StackFunction<'a>>);
 
 impl<'a> CallGraph<'a> {
-    /// Reads the functions of a program.
+    /// Reads the functions of a program. Refuses a function whose stack has no known bound.
     pub fn of(program: &'a Program<'_>) -> ReadResult<Self> {
         let mut graph = BTreeMap::new();
         let (guards, panic) = GUARDS;
@@ -98,7 +99,8 @@ impl<'a> CallGraph<'a> {
     }
 
     /// The largest stack of the whole program: the program after reset, interrupted by every other exception once, each at the
-    /// worst moment of the exception before. Priorities allow less nesting than that. A hard fault starts a new stack.
+    /// worst moment of the exception before. Priorities allow less nesting than that. A hard fault starts a new stack. The result
+    /// includes the stack of two panics in the logger.
     pub fn worst(&self, program: &Program<'_>) -> ReadResult<Depth> {
         let [reset, handlers @ ..] = program.handlers() else { Err("no vector table")? };
         let mut whole = self.depth(*reset)?;

@@ -1,6 +1,6 @@
 //! The effect of a Thumb instruction on the flow of control, the stack pointer and the interrupt mask.
 //!
-//! `yaxpeax-arm` decodes. It knows the A and R profiles, so three things are added here from the ARMv7-M Architecture
+//! `yaxpeax-arm` decodes the A and R profiles. So three things are added here from the ARMv7-M Architecture
 //! Reference Manual (DDI 0403): the special registers of `MSR` (B5.2.3), the floating-point instructions (A7.5), and the
 //! instructions that an M-profile core does not have.
 

@@ -1,4 +1,4 @@
-//! Random actions of a host and of a person on an arm, drawn from a seed.
+//! Random actions of a host, and of a person who handles the arm, drawn from a seed.
 
 use std::fmt::Write;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -35,7 +35,8 @@ const JOINT_FAULTS: [&str; 8] =
     ["late=20", "garbled=3", "stuck", "missing", "wall=80", "wall=100/500", "push=700", "push=-700"];
 /// Other faults that last for a time in [`SHORTLY`].
 const SHORT_FAULTS: [&str; 3] = ["7=thing=30", "7=thing=60/100", "supply=off"];
-/// How long such faults last, in microseconds. The longer one makes an emergency stop end in state 0 (D29).
+/// How long the faults of [`JOINT_FAULTS`] and [`SHORT_FAULTS`] last, in microseconds. After the longer time without supply,
+/// the arm enters state 0 (D29).
 const SHORTLY: [u64; 2] = [300_000, 1_200_000];
 /// Faults that stay until they are cleared.
 const ARM_FAULTS: [&str; 5] =
@@ -59,7 +60,7 @@ impl SessionRecorder for SessionLines {
     }
 }
 
-/// A session of about two seconds of virtual time.
+/// The text of a recorded session of about two seconds of virtual time.
 #[must_use]
 pub fn random_session(seed: u64) -> String {
     let mut random = Random(Xoshiro256PlusPlus::seed_from_u64(seed));

@@ -1,4 +1,4 @@
-//! Recorded sessions: a replay is equal, byte for byte, and says what differs if it is not.
+//! A replay of a recorded session is equal byte for byte, or returns the first difference. Other texts are refused.
 
 #![allow(clippy::unwrap_used)] // A panic is a failed test.
 

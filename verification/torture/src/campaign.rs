@@ -1,4 +1,5 @@
-//! Runs worlds on all processors until the time is used up or a rule is violated.
+//! Runs a campaign on all processors: worlds until the time is used up or a rule is violated, then trials of free motion and
+//! of the parser.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -23,9 +24,9 @@ const PROGRESS_PERIOD: RealTime = RealTime::from_millis(500);
 /// The time of a campaign.
 #[derive(Clone, Copy, Debug)]
 pub enum TimeBudget {
-    /// Virtual time.
+    /// The sum of the virtual times of all worlds.
     Virtual(Duration),
-    /// Real time.
+    /// The real time within which worlds begin. Each of them then runs for its whole virtual time.
     Real(RealTime),
 }
 
@@ -34,7 +35,7 @@ pub enum TimeBudget {
 pub struct CampaignPlan {
     /// The seed of the first world. The next world has the next seed.
     pub seed: u64,
-    /// The time of all worlds.
+    /// How long worlds run. The trials of free motion and of the parser come afterwards.
     pub budget: TimeBudget,
     /// The scenario of all worlds; `None` if each seed selects its own.
     pub scenario: Option<&'static Scenario>,
@@ -47,20 +48,20 @@ pub struct CampaignPlan {
 /// The result of a campaign.
 #[derive(Debug, Default)]
 pub struct CampaignResult {
-    /// The number of worlds and their counts, by scenario.
+    /// The number of completed worlds and the sum of their counts, by name of the scenario.
     pub worlds: BTreeMap<&'static str, (u64, WorldCounts)>,
-    /// The failed world with the lowest seed.
+    /// The failed world with the lowest seed; `None` if no world failed.
     pub failure: Option<Box<FailedWorld>>,
-    /// The trials of the parser.
+    /// The trials of the parser; empty if a world failed.
     pub parser_trials: Vec<ParserTrial>,
-    /// The sum of all trials of free motion.
+    /// The sum of all trials of free motion; zero if a world failed.
     pub free_motion: FreeMotionTrial,
-    /// The real time of the worlds.
+    /// The real time that the worlds took, without the trials after them.
     pub elapsed: RealTime,
 }
 
 impl CampaignResult {
-    /// The number of worlds and their counts, summed over all scenarios.
+    /// The number of completed worlds and the sum of their counts, over all scenarios.
     #[must_use]
     pub fn total(&self) -> (u64, WorldCounts) {
         self.worlds.values().fold((0, WorldCounts::default()), |(worlds, mut sum), (more, counts)| {
@@ -91,7 +92,7 @@ struct RemainingWork {
     is_stopped: bool,
 }
 
-/// Runs the plan. Calls `progress` from time to time with the result so far and the elapsed real time.
+/// Runs the plan. While worlds run, calls `progress` from time to time with the result so far and the elapsed real time.
 pub fn run(plan: &CampaignPlan, mut progress: impl FnMut(&CampaignResult, RealTime)) -> CampaignResult {
     let mut result = CampaignResult::default();
     let start = RealInstant::now();

@@ -9,7 +9,7 @@ use crate::campaign::{CampaignPlan, TimeBudget};
 use crate::load;
 use crate::scenario::{self, SCENARIOS, Scenario};
 
-/// Virtual days by default.
+/// The virtual days of a campaign without `--days` and `--minutes`.
 const DAYS: f64 = 30.0;
 
 /// Simulates the whole arm with injected faults: the real controller, simulated servos, a flash that loses power, and

@@ -24,7 +24,7 @@ pub struct FreeMotionTrial {
     pub motions: usize,
     /// The number of bytes to the servos that were compared.
     pub bytes: usize,
-    /// The seeds of motions in which the bytes differ, or in which a joint was blocked or let go.
+    /// The seeds of motions in which the bytes differ, or in which a joint was blocked or let go with protection.
     pub different: Vec<u64>,
 }
 
@@ -37,7 +37,7 @@ impl FreeMotionTrial {
     }
 }
 
-/// Carries out the motion of a seed.
+/// Carries out the motion of a seed with and without protection, and compares the bytes to the servos.
 #[must_use]
 pub fn run(seed: u64) -> FreeMotionTrial {
     let [mut with, mut without] = [1, 0].map(|protection| MovedArm::after(&FreeMoves::of(seed, protection)));
@@ -46,7 +46,7 @@ pub fn run(seed: u64) -> FreeMotionTrial {
     FreeMotionTrial { motions: 1, bytes: with.sent().len(), different }
 }
 
-/// Simulated servos, and all that was sent to them.
+/// Simulated servos, and every byte that was sent to them with its time.
 struct RecordedServos {
     plant: Plant,
     sent: Vec<(Instant, u8)>,

@@ -6,7 +6,7 @@
 //!                                 └──▶ parser_trial: good frames on a disturbed line ─▶ ParserTrial ─────────────────┤
 //!   cli ─▶ load: a client that saturates a port                                               result_table ◀─────────┘
 //!   cli ─▶ sag: how far the arm sags during a failure
-//!   cli ─▶ obstacles: what becomes of the arm at walls, after alarms and after emergency stops
+//!   cli ─▶ obstacles: falls and pushes of the arm at walls, after alarms and after emergency stops
 //!   fuzz: the targets of `verification/fuzz/`, and of the test of its corpora
 //! ```
 //!

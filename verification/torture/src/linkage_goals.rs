@@ -10,18 +10,19 @@ pub(crate) const LINKAGE: (i32, i32) = (84_000_000, 226_000_000);
 /// Goals are rounded to counts of up to 0.212 degrees. This allows two counts of each of the two joints, in microdegrees.
 const ROUNDING: i32 = 2 * 2 * 212_000;
 
-/// The smallest excess of the goals over the linkage since both joints are driven, in microdegrees; `None` before the first.
+/// The smallest excess of the goals over the linkage since both joints are driven, in microdegrees; `None` before
+/// the first check.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct LinkageGoals(Option<i32>);
 
 impl LinkageGoals {
-    /// Forgets the goals: a joint engaged anew, an offset changed, or the limit is off.
+    /// Forgets the smallest excess, because a joint engaged anew, an offset changed, or the limit is off.
     pub(crate) fn reset(&mut self) {
         self.0 = None;
     }
 
     /// Checks the goals of joints 2 and 3 in counts, with the offsets of these joints; `None` for a joint that is not
-    /// driven. From outside, where a hand may have left the arm, goals move only inwards.
+    /// driven. If the first goals are outside the linkage, where a hand may have left the arm, later goals must move inwards.
     pub(crate) fn check(&mut self, goals: [Option<u16>; 2], offsets: [i8; 2]) -> Check {
         let [Some(two), Some(three)] = goals else {
             self.reset();

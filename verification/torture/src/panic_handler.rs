@@ -5,10 +5,10 @@ use motion_core::servo_bus::Torque;
 use motion_core::servo_bus::frame::{ServoFrameBuffer, register, sync_write};
 use protocol_core::registers::Joint;
 
-/// The number of times that it sends the frame, with a pause before each.
+/// The number of times that the panic handler sends the frame, with a pause before each.
 pub(crate) const FRAMES: usize = 4;
 
-/// The frame: all servos in state 0, damping.
+/// The frame of the panic handler, which switches all servos to damping.
 pub(crate) fn damping_frame(codes: TorqueCodes) -> ServoFrameBuffer {
     let mut frame = ServoFrameBuffer::new();
     let code = codes.code(Torque::Damping);

@@ -15,7 +15,7 @@ pub struct ParserTrial {
     pub frames: usize,
     /// Good frames that the parser did not return.
     pub lost: usize,
-    /// The longest time from the end of a burst to the last of its frames, in microseconds.
+    /// The longest time from the last byte of a good frame to its return, less the duration of its burst, in microseconds.
     pub worst_delay_us: u64,
 }
 

@@ -22,7 +22,7 @@ use crate::seeded_rng::SeededRng;
 
 /// Targets in degrees: the rear arm leans to the front, the forearm points down by 35 degrees.
 pub const POSE: [u8; JOINTS] = [90, 60, 100, 90, 90, 90, 80];
-/// The time for the move to [`POSE`], and the time of the measurement after each failure.
+/// The time for start-up, the time for the move to [`POSE`], and the time of the measurement after each failure.
 pub const SETTLE_TIME: Duration = Duration::from_millis(5_000);
 /// The sampling period of the joint angles.
 const SAMPLE_TIME: Duration = Duration::from_millis(1);
@@ -232,8 +232,7 @@ fn degrees(millidegrees: u32) -> String {
 mod tests {
     use super::*;
 
-    /// The droop of each joint in the pose, and how far the plant's load lets it swing about it, in thousandths of a
-    /// degree.
+    /// The greatest distance of each joint from its set-point under its load in the pose, in thousandths of a degree.
     fn droops() -> [u32; JOINTS] {
         let arm = PosedArm::new();
         Joint::ALL.map(|joint| arm.world.plant().droop(joint).unwrap().unsigned_abs())

@@ -35,7 +35,7 @@ pub enum InjectedFault {
     Watchdog,
     /// The controller panics, damps the servos and restarts. The servos keep their power.
     Panic,
-    /// A sector becomes unerasable, or a bit unprogrammable.
+    /// A bit becomes unprogrammable in one of four cases, or a sector unerasable in one of forty.
     FlashWear,
     /// A hand turns a joint.
     Hand,
@@ -62,7 +62,7 @@ pub struct Scenario {
     pub description: &'static str,
     /// The mean time between two faults.
     pub mean_interval: Duration,
-    /// The faults, each with the same probability. A fault may be listed twice.
+    /// The faults, each with the same probability. A fault that is listed twice is twice as likely.
     pub faults: &'static [InjectedFault],
     /// The number of writes of settings in a thousand writes.
     pub settings_per_mille: u64,

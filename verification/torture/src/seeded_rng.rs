@@ -25,7 +25,7 @@ impl SeededRng {
         self.0.byte()
     }
 
-    /// A number from 0 to below `limit`, as an index or a count.
+    /// A number below `limit`, as an index or a count; 0 if `limit` is 0.
     pub fn below(&mut self, limit: usize) -> usize {
         self.0.index(limit)
     }
@@ -45,13 +45,14 @@ impl SeededRng {
         self.0.below(many) == 0
     }
 
-    /// A time between two limits.
+    /// A time from `shortest` to `longest`, all equally likely.
     pub fn between(&mut self, shortest: Duration, longest: Duration) -> Duration {
         let (low, high) = (shortest.as_micros(), longest.as_micros());
         Duration::from_micros(low + self.0.below(high.saturating_sub(low) + 1))
     }
 
-    /// A time between two limits. All orders of magnitude are about equally likely.
+    /// A time from `shortest` to `longest`, with more short times than [`Self::between`] gives: at least half of the times are at
+    /// most a third of `longest`, at least a quarter at most a ninth, and so on.
     pub fn any_scale(&mut self, shortest: Duration, longest: Duration) -> Duration {
         let mut limit = longest;
         while limit > shortest && self.one_in(2) {
@@ -60,7 +61,7 @@ impl SeededRng {
         self.between(shortest, limit.max(shortest))
     }
 
-    /// The time until an event with this mean interval.
+    /// The time until an event with this mean interval: at most twice the mean, all times equally likely.
     pub fn wait(&mut self, mean: Duration) -> Duration {
         self.between(Duration::from_micros(1), Duration::from_micros(mean.as_micros() * 2))
     }

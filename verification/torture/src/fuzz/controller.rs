@@ -46,7 +46,7 @@ enum ControllerStep<'a> {
         address: u8,
         values: &'a [u8],
     },
-    // Four writes whose values are in range.
+    // The next four steps write values that are in range.
     State(u8),
     Pose {
         speed: u8,

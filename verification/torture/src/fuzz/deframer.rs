@@ -124,7 +124,7 @@ impl LateReader {
         }
     }
 
-    /// Passes the waiting bytes, or the silence, to the deframer.
+    /// Passes the waiting bytes, or the silence, to the deframer and to the model.
     fn deliver(&mut self) {
         let taken = self.deframer.push(Instant::from_micros(self.now_us), &self.waiting);
         if !self.waiting.is_empty() {

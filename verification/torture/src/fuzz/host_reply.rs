@@ -8,7 +8,7 @@ use protocol_core::time::{Duration, Instant};
 use protocol_core::wire::{Deframer, FrameBuffer, ToHost};
 use sevenbot::{Snapshot, names, register_text};
 
-/// Bytes in pieces of this size, and a text.
+/// The input of a run: bytes from the arm, the size of the pieces in which they arrive, and a text that names a register.
 #[derive(Arbitrary, Debug)]
 pub struct Input<'a> {
     piece: u8,
@@ -96,8 +96,8 @@ fn check(snapshot: &Snapshot) {
     check_names(snapshot);
 }
 
-/// Checks that every register of the snapshot has its own entry or one for its whole row, and that the library parses the
-/// name of each entry.
+/// Checks that every register of the snapshot has an entry of its own or an entry for its whole row, and that the library
+/// parses the name of each entry.
 fn check_names(snapshot: &Snapshot) {
     let mut entries = register_text::entries(snapshot).into_iter().peekable();
     let mut row = None;

@@ -96,7 +96,7 @@ fn check_settings(stored: Option<&Image>) {
     let Image(settings) = file.image();
     for row in MAP.iter().filter(|row| row.region == Region::Eeprom) {
         for address in (row.address..).take(row.count.into()) {
-            // The region begins at 8.
+            // The EEPROM region begins at address 8.
             let value = settings[usize::from(address - 8)];
             assert!(row.range.contains(value.into()), "register {address} is {value}");
             let most = if OPTIONS.holds(address) { 3 } else { 0 };

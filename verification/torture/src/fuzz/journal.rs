@@ -1,5 +1,5 @@
-//! The journal of the settings with any power cuts (D19), on the strict flash model. It has to keep the invariants of the
-//! journal's own tests.
+//! The journal of the settings with any power cuts (D19), on the strict flash model. The journal's own tests define
+//! the invariants.
 
 use crate::shared::journal_world::World;
 use arbitrary::Arbitrary;

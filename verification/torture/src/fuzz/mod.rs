@@ -1,7 +1,7 @@
 //! The fuzz targets. Each runs its input and panics if an invariant is violated.
 //!
-//! `verification/fuzz/` passes the inputs of the fuzzer. [`TARGETS`] passes the inputs in files, so that the corpora are a
-//! test for any compiler.
+//! `verification/fuzz/` passes the inputs of the fuzzer. A test passes the files of the corpora to the functions in
+//! [`TARGETS`], without a fuzzer and with any compiler.
 
 use arbitrary::{Arbitrary, Unstructured};
 

@@ -232,12 +232,12 @@ fn word_at(address: u8) -> Option<u8> {
     matches!(address, 128..=141 | 184..=185).then_some(address & !1)
 }
 
-/// Is the value in the range of a writable register of two bytes, according to `docs/protocol.md`?
+/// True if `word` is in the range of the writable two-byte register at `low`, according to `docs/protocol.md`.
 fn is_word(low: u8, word: u16) -> bool {
     if low == 184 { word == 0 || (5..=1_000).contains(&word) } else { word <= 18_000 }
 }
 
-/// Is the value in the range of a writable register, according to `docs/protocol.md`?
+/// True if `value` is in the range of the writable register at `address`, according to `docs/protocol.md`.
 fn is_in_range(map: Map, address: u8, value: u8) -> bool {
     let max = match (map, address) {
         (_, 12) => 7,

@@ -39,7 +39,7 @@ pub enum LoadError {
         /// The cause.
         cause: serialport::Error,
     },
-    /// The port was removed.
+    /// A read or a write of the port failed, for example because the port was removed.
     #[error("the port is gone: {0}")]
     Gone(#[from] io::Error),
     /// The duration is not above 0.

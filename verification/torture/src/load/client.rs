@@ -30,7 +30,7 @@ struct PendingRead {
     address: u8,
     count: u8,
     since: Instant,
-    /// Bytes sent so far, with this read.
+    /// The number of bytes sent up to the end of this read.
     sent: u64,
 }
 
@@ -121,7 +121,7 @@ impl LoadClient {
         while !rest.is_empty() {
             match self.port.write(rest) {
                 Ok(count) => rest = rest.get(count..).unwrap_or(&[]),
-                // The port is full. Replies make room.
+                // The port is full. Reading replies lets the arm take more requests.
                 Err(error) if is_temporary(&error) => self.receive()?,
                 Err(error) => return Err(error.into()),
             }
@@ -178,7 +178,7 @@ impl LoadClient {
         self.result.round_trips.add(read.since.elapsed());
     }
 
-    /// Counts the pending bytes. Apart from reports, no queue between this client and the arm can hold more.
+    /// Updates the largest number of pending bytes. Apart from reports, no queue between this client and the arm can hold more.
     fn count_pending(&mut self) {
         let reply = |read: &PendingRead| (PREFIX_LENGTH + usize::from(read.count) + CRC_LENGTH) as u64;
         let pending = (self.sent - self.acknowledged, self.pending.iter().map(reply).sum());

@@ -22,7 +22,7 @@ pub use result::LoadResult;
 /// The period of the progress line and of the memory measurement.
 const PROGRESS_PERIOD: Duration = Duration::from_secs(1);
 
-/// Loads the port.
+/// Saturates the port for the time in `args`, then waits for the pending replies.
 ///
 /// # Errors
 /// See [`LoadError`].

@@ -14,7 +14,7 @@ pub struct LoadResult {
     pub(super) replies: u64,
     pub(super) reports: u64,
     pub(super) lost: u64,
-    /// Replies without a read.
+    /// Replies that match no pending read.
     pub(super) unexpected: u64,
     pub(super) corrupted: u64,
     pub(super) bytes: u64,

@@ -1,4 +1,4 @@
-//! An arm in front of an obstacle, and what all experiments share.
+//! An arm in front of an obstacle, and the functions that several experiments use.
 
 use arm_sim::plant::Plant;
 use protocol_core::registers::map::PROTECTION;
@@ -38,7 +38,7 @@ pub trait ObstacleArm: Sized {
     /// The controller is gone, or does not reply.
     fn read(&mut self, address: u8) -> Result<u8, Self::Error>;
 
-    /// Lets a millisecond pass, or a little more.
+    /// Lets at least a millisecond pass.
     ///
     /// # Errors
     /// The controller is gone.

@@ -1,4 +1,4 @@
-//! A thing between the claws, which a gripper holds for a long time.
+//! A gripper that holds a thing between its claws for a long time.
 
 use arm_sim::plant::Thing;
 use protocol_core::registers::Joint;
@@ -16,7 +16,7 @@ const SETTLED_S: u64 = 30;
 const THING_AT: i32 = 60;
 const TARGET: u8 = 20;
 
-/// A soft thing at the lowest grip limit, and a hard one at the default.
+/// The table of grips: a soft thing at the lowest grip limit, and a hard thing at the default limit.
 pub(super) fn table<A: ObstacleArm>(time: Duration) -> Result<String, A::Error> {
     let mut table = format!(
         "| between the claws | grip limit | peak push | push after {SETTLED_S} s | after {} min | temperature | alarms |\n\

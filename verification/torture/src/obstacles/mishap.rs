@@ -11,7 +11,7 @@ use super::arm::{ObstacleArm, PERIOD_MS, SETTLE_TIME, degrees, start};
 const PAYLOAD_G: u16 = 100;
 /// The point that is streamed, in hundredths of a degree: 40 degrees from the position of joint 1.
 const POINT: u16 = 13_000;
-/// The time after an alarm, or after the supply came back.
+/// The time of the measurement after an alarm, or after the supply came back.
 const AFTER_TIME: Duration = Duration::from_millis(4_000);
 
 /// What happens to an arm while it follows a stream.

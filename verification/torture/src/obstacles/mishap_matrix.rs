@@ -1,5 +1,5 @@
-//! Alarms and emergency stops in the matrix of poses and payloads, while a joint is driven: how far a joint falls while it has no
-//! torque, and how far its motor turns it when it has torque again.
+//! Alarms and emergency stops in the matrix of poses and payloads, while a joint is driven. Measures how far a joint falls
+//! without torque, and how far its motor turns it after the torque comes back.
 
 use arm_sim::plant::SupplyFault;
 use arm_sim::servo::Trip;
@@ -10,9 +10,9 @@ use super::arm::{ObstacleArm, degrees};
 use super::mishap::{Mishap, seconds};
 use super::wall::WallCase;
 
-/// The joint is driven for this time. Nothing is sent after it, so a later motion is the effect of windup.
+/// The joint is driven for this time. No target is sent afterwards, so a later motion is the effect of windup.
 const DRIVEN_TIME: Duration = Duration::from_millis(400);
-/// The time after an alarm, or after the supply came back.
+/// The time of the measurement after an alarm, or after the supply came back.
 const AFTER_TIME: Duration = Duration::from_millis(6_000);
 
 /// How far a joint fell and swung. Angles are in thousandths of a degree.

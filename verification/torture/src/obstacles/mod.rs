@@ -1,10 +1,13 @@
-//! Measures what becomes of the arm at obstacles, with and without its protection (`torture obstacles`; on the emulated image
-//! `cargo xtask obstacles`).
+//! Measures falls, pushes and speeds of the arm at obstacles, after alarms and after emergency stops, with and without its
+//! protection (`torture obstacles`; on the emulated image `cargo xtask obstacles`).
 //!
-//! The first tables have a joint that is driven against a wall, in a matrix of poses, payloads and speeds, by a target or by
-//! a stream of points. The next ones have forced alarms and emergency stops, first under a stream, then in that matrix. The
-//! last one has things between the claws. All values are true values of the plant, sampled once per millisecond. Push is the
-//! load of a joint that stands still, in 0.1 % of its stall torque.
+//! The first tables show a joint that is driven against a wall, in a matrix of poses, payloads and speeds, by a target or by
+//! a stream of points. The next tables show forced alarms and emergency stops, first under a stream, then in that matrix at
+//! speed 60. The last table shows things between the claws.
+//!
+//! Angles and pushes are true values of the plant, sampled about once per millisecond. Motor state, temperature and alarms
+//! are registers. A push is the duty of the joint's motor in 0.1 %. While the joint stands still, this is its torque relative
+//! to the stall torque.
 
 mod arm;
 mod grip;

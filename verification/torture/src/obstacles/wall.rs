@@ -20,7 +20,7 @@ const POSES: [[u8; 6]; 8] = [
     [90, 110, 90, 45, 90, 90],
     [30, 50, 50, 135, 100, 130],
 ];
-/// The pose of the few cases.
+/// The pose of [`WallCase::few`].
 const FEW_POSE: [u8; 6] = POSES[0];
 
 const SPEEDS: [u8; 3] = [10, 60, 0];
@@ -30,12 +30,13 @@ const TARGET_DISTANCE: i16 = 30;
 /// The time at the wall, and the time after the wall has gone.
 const PUSH_TIME: Duration = Duration::from_millis(5_000);
 const AFTER_TIME: Duration = Duration::from_millis(2_000);
-/// The time in which a stream reaches its target, and the time of its last point. That is before the wall is removed, so a
-/// motion after the removal is the effect of windup.
+/// The time in which a stream reaches its target, and the time of its last point. The last point comes before the wall is
+/// removed, so a motion after the removal is the effect of windup.
 const STREAM_TIME: Duration = Duration::from_millis(1_000);
 const STREAM_END: Duration = Duration::from_millis(3_500);
-/// The push is averaged over the first time. It counts as lasting after the second time, from the contact on.
+/// The lasting push is the greatest average over this time.
 const AVERAGED_TIME: Duration = Duration::from_millis(100);
+/// The averages begin this long after the joint came to the wall.
 const LASTING_AFTER: Duration = Duration::from_millis(400);
 /// A joint that was away from the wall for this long has bounced off.
 const BOUNCE_TIME: Duration = Duration::from_millis(50);
@@ -48,7 +49,7 @@ pub struct WallCase {
     payload_g: u16,
     speed: u8,
     is_streamed: bool,
-    /// The wall is at a smaller angle than the joint.
+    /// True if the wall is at a smaller angle than the joint.
     is_behind: bool,
 }
 
@@ -110,7 +111,7 @@ impl WallCase {
         number.is_some_and(|number| number % 6 == usize::from(self.joint.index()))
     }
 
-    /// Starts an arm, moves it to the pose, and sets the speed of the joint and the period of the stream.
+    /// Starts an arm with the payload, moves it to the pose, and sets the speed of the joint. For a stream, sets its period, too.
     pub(super) fn start<A: ObstacleArm>(&self, is_protected: bool) -> Result<A, A::Error> {
         let mut arm: A = start(is_protected)?;
         arm.plant().set_load(self.payload_g);
@@ -123,7 +124,7 @@ impl WallCase {
         Ok(arm)
     }
 
-    /// Drives the joint for this time.
+    /// Drives the joint towards its target for this time.
     pub(super) fn drive_for<A: ObstacleArm>(&self, arm: &mut A, time: Duration) -> Result<(), A::Error> {
         let begun = arm.now();
         self.drive(arm, Duration::ZERO)?;
@@ -159,7 +160,7 @@ impl WallCase {
         arm.write(FINE_TARGET.of(self.joint), &point.to_le_bytes())
     }
 
-    /// Drives the joint against its wall.
+    /// Drives the joint against its wall for [`PUSH_TIME`]. The sag in the result is 0.
     fn push<A: ObstacleArm>(&self, arm: &mut A) -> Result<WallResult, A::Error> {
         let begun = arm.now();
         let mut next = Some(begun);
@@ -216,7 +217,7 @@ fn lasting_of_contact(pushes: &[(Instant, u16)]) -> u16 {
 /// The push, the trip and the sag of a joint at a wall.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct WallResult {
-    /// The greatest push, in 0.1 %.
+    /// The greatest push within half a degree of the wall, in 0.1 %.
     pub peak: u16,
     /// The greatest average push over 100 ms, from 400 ms after the joint came to the wall, in 0.1 %.
     pub lasting: u16,
@@ -226,7 +227,7 @@ pub struct WallResult {
     pub sag: u32,
 }
 
-/// Drives the joint of a case against a wall.
+/// Drives the joint of a case against a wall, then removes the wall and measures the sag.
 ///
 /// # Errors
 /// The arm fails.

@@ -1,4 +1,4 @@
-//! Counts how often a joint is given torque: after three times in a minute it gets none until register 29 is written (D28).
+//! Counts how often a joint is given torque. After three times in a minute it gets no torque until register 29 is written (D28).
 
 use protocol_core::time::{Duration, Instant};
 

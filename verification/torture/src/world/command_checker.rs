@@ -1,4 +1,4 @@
-//! Checks the commands to the servos (D10, D12, D13).
+//! Checks the commands to the servos (D10, D12, D13, D25, D27 to D29).
 //!
 //! - No goal is out of reach at the allowed speed.
 //! - Goals are sent only in motor state servo, and torque switches follow the motor state.
@@ -8,6 +8,8 @@
 //! - A joint that lost its torque holds the position where it gets torque again, unless the host wrote a target meanwhile
 //!   (D28, D29).
 //! - A goal beyond the allowed speed is nearer to the measured position, because the joint gives way (D27).
+//! - Goals of joints 2 and 3 keep the linkage while that limit is on (D25). A joint that has arrived has its target as goal.
+//! - A joint that was let go gets torque only after its alarm, and at most three times in a minute (D28).
 
 mod frames;
 mod goals;
@@ -30,7 +32,7 @@ use crate::per_joint::PerJoint;
 use crate::violation::Violation;
 use crate::world_counts::WorldCounts;
 
-/// A joint without a goal for this long, whose servo is not silent, is let go because of an alarm. It is no longer driven.
+/// If a joint gets no goal for this long although its servo answers, it is let go because of an alarm, and no longer driven.
 const LET_GO_TIME: Duration = Duration::from_millis(10_000);
 
 /// Counts of one control cycle at 372 degrees/s. A set-point may be ahead of the last goal by one cycle, and by one more
@@ -41,12 +43,13 @@ const ONE_CYCLE: u16 = 19;
 #[derive(Debug)]
 pub(super) struct CommandChecker {
     codes: TorqueCodes,
-    /// The largest distance of a set-point from the last goal, in counts, and its time.
+    /// How far a set-point may be ahead of the last goal, in counts, and the longest time from a goal until a read fails and
+    /// stops the set-point.
     ahead: u16,
     ahead_time: Duration,
     started_at: Instant,
     ranges: PerJoint<Option<ReachableRange>>,
-    /// The ranges of joints that get no goals for the time being. Their set-points stand still (D29).
+    /// The ranges of joints that get no goals at present. Their set-points stand still (D29).
     paused: PerJoint<Option<ReachableRange>>,
     /// When a frame of goals last had no goal for the joint.
     pub(super) paused_at: PerJoint<Instant>,
@@ -68,7 +71,7 @@ pub(super) struct CommandChecker {
     engaged_at: PerJoint<Option<Instant>>,
     servo_lost_at: PerJoint<Option<Instant>>,
     target_written_at: PerJoint<Option<Instant>>,
-    /// The last target came while the joint may have been let go: it is kept until the joint engages (D28).
+    /// True if the last target came while the joint may have been let go. The target is kept until the joint engages (D28).
     is_written_for_later: PerJoint<bool>,
     /// How often each joint was given torque since register 29 was written.
     attempts: PerJoint<EngagementAttempts>,
@@ -125,7 +128,7 @@ impl CommandChecker {
         WorldCounts { commands: self.count, engagements: self.engagements, ..WorldCounts::default() }
     }
 
-    /// Takes bytes that the controller receives.
+    /// Records the replies in the bytes that the controller receives.
     pub(super) fn replies_received(&mut self, now: Instant, bytes: &[u8]) {
         self.replies.received(now, bytes);
     }
@@ -166,19 +169,19 @@ impl CommandChecker {
         self.is_written_for_later[joint] = may_be_let_go;
     }
 
-    /// True if the last target of the host came while the joint may have been let go, and it did not engage since (D28).
+    /// True if the last target of the host came while the joint may have been let go, and the joint did not engage since (D28).
     pub(super) fn keeps_target(&self, joint: Joint) -> bool {
         self.is_written_for_later[joint] && self.engaged_at[joint] <= self.target_written_at[joint]
     }
 
-    /// Register 29 was written: the attempts count anew (D28).
+    /// Register 29 was written: the attempts count anew (D28), and an outage is forgotten (D29).
     pub(super) fn state_written(&mut self) {
         self.attempts = PerJoint::default();
         self.replies.forget_outage();
     }
 
-    /// True if the controller may not know yet whether the supply was lost (D29). While a servo does not answer, no joint
-    /// gets torque then.
+    /// True if the controller may not know yet whether the supply was lost (D29). In this case no joint gets
+    /// torque while a servo does not answer.
     pub(super) fn is_undecided(&self) -> bool {
         self.replies.was_outage()
     }
@@ -193,18 +196,18 @@ impl CommandChecker {
         self.replies.forget_doubt(joint);
     }
 
-    /// The motor state changed: no joint is driven any more, or none was.
+    /// The motor state changed to or from servo, so each joint begins anew, without a goal.
     pub(super) fn state_changed(&mut self) {
         Joint::ALL.into_iter().for_each(|joint| self.forget(joint));
-        // A joint that engages anew keeps the target that the host wrote since then.
+        // A joint that engages anew keeps a target that the host wrote since the change.
         self.engaged_at = PerJoint::all(None);
     }
 
-    /// The joint's servo was lost. It may hold its last goal.
+    /// The servo of the joint fell silent. It may still hold its last goal.
     pub(super) fn servo_lost(&mut self, now: Instant, joint: Joint) {
         self.linkage.reset();
         self.servo_lost_at[joint] = Some(now);
-        // A joint that has only a goal has no torque to keep: it engages anew at its position.
+        // A joint that has a goal but no torque engages anew at its position.
         let had_torque = self.is_driven(joint) && now - self.goal_at[joint] < LET_GO_TIME;
         let goal = self.goal(joint).map(|goal| (goal, self.ahead)).or(self.kept_goals[joint]);
         self.kept_goals[joint] = goal.filter(|_| had_torque);
@@ -212,7 +215,7 @@ impl CommandChecker {
         self.is_on[joint] = false;
     }
 
-    /// A written speed is allowed until the next frame, even if another write replaces it.
+    /// Allows a written speed until the next goal of each joint, even if another write replaces it.
     pub(super) fn speed_written(&mut self, model: &RegisterModel) {
         for (joint, ranges) in Joint::ALL.into_iter().zip(self.ranges.0.iter_mut().zip(&mut self.paused.0)) {
             for range in [ranges.0, ranges.1].into_iter().flatten() {
@@ -221,8 +224,8 @@ impl CommandChecker {
         }
     }
 
-    /// Offsets changed: the controller computes its set-points again, from whole counts. Its targets stay the same in degrees,
-    /// so they change in counts, as after a write.
+    /// Offsets changed: the controller computes its set-points again, from whole counts. The targets stay the same in
+    /// degrees, so they change in counts, as after a write.
     pub(super) fn offsets_changed(&mut self, now: Instant) {
         self.linkage.reset();
         self.target_written_at = PerJoint::all(Some(now));

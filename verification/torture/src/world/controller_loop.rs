@@ -19,7 +19,7 @@ use crate::violation::{Check, Violation, ensure};
 /// The number of outputs after which the controller has to wait. Each waiting request causes at most one output, and
 /// fewer than this many wait.
 const MAX_OUTPUTS: u32 = 4_000;
-/// The number of consecutive waits until a time in the past that is a violation.
+/// This many consecutive waits for a time that has passed are a violation.
 const MAX_EXPIRED_WAITS: u32 = 4;
 
 /// An [`Output`] without a borrow of the controller: its bytes are in [`PoweredArm::output_bytes`].
@@ -55,7 +55,7 @@ impl PoweredArm {
         count(FRAMES_ACCEPTED.address).wrapping_add(count(FRAMES_REFUSED.address))
     }
 
-    /// Passes the waiting host bytes, perhaps none, to the controller. True if it took any.
+    /// Passes the waiting host bytes, perhaps none, to the controller. Returns true if the controller took any.
     fn deliver_host_bytes(&mut self, now: Instant) -> bool {
         let taken = self.controller.host_bytes(now, self.to_arm.waiting());
         if taken > 0 {

@@ -32,7 +32,7 @@ use reply_comparison::ReplyComparison;
 const BOOT_TIME: Duration = Duration::from_millis(200);
 /// The longest delay of a reply on the wire.
 const MAX_DELAY: Duration = Duration::from_millis(40);
-/// In counts per second. The controller may reject the readings of a joint that turns faster: it believes up to 2,000 (D12).
+/// In counts per second. The controller may reject the readings of a joint that turns faster: its limit is 2,000 (D12).
 const BELIEVED_SPEED: u16 = 1_900;
 /// Kept bytes of an incomplete reply. The longest reply of a servo is shorter.
 const MAX_REPLY: usize = 32;
@@ -40,16 +40,16 @@ const MAX_REPLY: usize = 32;
 /// Whether a servo replies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Availability {
-    /// It has replied to every read since this time.
+    /// The servo has replied to every read since this time.
     Responding(Instant),
-    /// It has replied to no read since this time.
+    /// The servo has replied to no read since this time.
     Silent(Instant),
-    /// It replies to some reads.
+    /// The servo replies to some reads.
     Uncertain,
 }
 
 impl Availability {
-    /// True if it replies to every read now. The time in `Responding` is in the future while a servo starts.
+    /// True if the servo replies to every read now. The time in `Responding` is in the future while a servo starts.
     fn has_responded(self, now: Instant) -> bool {
         matches!(self, Self::Responding(since) if now >= since)
     }
@@ -80,13 +80,13 @@ pub(super) struct DisturbedBus {
     /// Frames that are delayed on the wire, with the time of their arrival.
     delayed: VecDeque<(Instant, Vec<u8>)>,
     faults: PerJoint<Option<ServoFault>>,
-    /// The time of the last change of each servo's fault.
+    /// When each servo's fault or supply last changed, or when the servo responds again after a start.
     since: PerJoint<Instant>,
     disturbed_at: Instant,
     /// The time of the last restart of the controller alone.
     pub(super) restarted_at: Instant,
     last_status: PerJoint<StatusFields>,
-    /// When each joint was last turned faster than the controller believes.
+    /// When each servo last reported a speed above [`BELIEVED_SPEED`].
     outran_at: PerJoint<Instant>,
     /// The received part of an incomplete reply.
     partial_reply: Vec<u8>,
@@ -174,7 +174,7 @@ impl DisturbedBus {
         self.disturbed_frames += 1;
     }
 
-    /// Returns the bytes that reach the controller now.
+    /// Returns the bytes that reach the controller now, after disturbances.
     pub(super) fn receive(&mut self, now: Instant, rng: &mut SeededRng) -> Vec<u8> {
         let is_disturbed = self.disturbance != DisturbanceRates::default();
         let mut bytes = self.plant.poll(now).to_vec();
@@ -194,7 +194,7 @@ impl DisturbedBus {
         bytes
     }
 
-    /// Records the status in a reply that was alone on the wire. The reply may come in parts of any length.
+    /// Records the status of a complete reply as the servo sent it. The reply may come in parts of any length.
     fn record_status(&mut self, now: Instant, bytes: &[u8]) {
         self.partial_reply.extend_from_slice(bytes);
         let starts = 0..self.partial_reply.len();

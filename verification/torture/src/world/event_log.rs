@@ -18,8 +18,8 @@ pub(super) struct EventLog {
     bus: Ring,
 }
 
-/// The last entries of one kind. A new entry reuses the buffers of the oldest one: frames are far more frequent than
-/// reports of a violation.
+/// The last entries of one kind. A new entry reuses the buffers of the oldest one, so that the frequent frames need no
+/// allocation.
 #[derive(Debug, Default)]
 struct Ring {
     entries: VecDeque<LogEntry>,

@@ -1,4 +1,4 @@
-//! The effect of a write to the extended block, from docs/protocol.md, section 9.
+//! The rules of the extended block, from docs/protocol.md, section 9: values of writes, and positions that a read shows.
 
 use motion_core::calibration::{MicroDegrees, angle_from_counts};
 use protocol_core::registers::map::refusal;
@@ -33,7 +33,7 @@ const fn low_byte(at: u8) -> Option<u8> {
 }
 
 /// The reason for which a write is refused because of this byte of a two-byte register, and the address of its low byte
-/// (D22). `None` for the other registers.
+/// (D22). `None` if the register is written whole and its value is in range, or if it is no writable two-byte register.
 pub(crate) fn word_offence(items: &[(u8, u8)], at: u8) -> Option<(u8, u8)> {
     let low = low_byte(at)?;
     let Some(value) = word(items, low) else { return Some((refusal::HALF_A_WORD, low)) };
@@ -46,7 +46,7 @@ pub(crate) const fn is_word(at: u8) -> bool {
     low_byte(at).is_some()
 }
 
-/// The two-byte register at `low` in a write that covers both its bytes.
+/// The value that a write gives to the two-byte register at `low`; `None` if the write does not cover both bytes.
 fn word(items: &[(u8, u8)], low: u8) -> Option<u16> {
     let byte = |wanted| items.iter().find(|(at, _)| *at == wanted).map(|(_, value)| *value);
     Some(u16::from_le_bytes([byte(low)?, byte(low + 1)?]))

@@ -107,7 +107,7 @@ impl TortureWorld {
         }
     }
 
-    /// Injects a fault that only a powered controller can have.
+    /// Injects a fault that only a powered controller can have. If the controller is off, switches it on instead.
     fn inject_controller_fault(&mut self, fault: InjectedFault) {
         let blocked_until = self.now + self.random_time();
         let PowerState::On(mut arm) = std::mem::replace(&mut self.power, PowerState::Taken) else {
@@ -155,7 +155,8 @@ impl TortureWorld {
         });
     }
 
-    /// Moves the hand. The hand releases a joint that is or may be driven: a silent joint may be.
+    /// Moves the hand. The hand releases a joint that may be driven, when its time is over, and while the bus is disturbed. A
+    /// silent joint counts as driven only while its servo has torque.
     pub(super) fn move_hand(&mut self) {
         let Some(hand) = self.hand.as_mut().filter(|hand| hand.next_at <= self.now) else { return };
         let is_driven = match &self.power {

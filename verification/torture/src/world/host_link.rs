@@ -70,7 +70,7 @@ impl HostToArm {
         self.last_taken_at = now;
     }
 
-    /// The last time the arm took bytes. It measures silence from then on.
+    /// The last time at which the arm took bytes. The arm measures silence from this time on.
     pub(super) const fn last_taken_at(&self) -> Instant {
         self.last_taken_at
     }

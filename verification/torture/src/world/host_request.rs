@@ -1,4 +1,4 @@
-//! Requests of the host as bytes, and a search for unintended frames in the bytes that were sent.
+//! Requests of the host and frames of the arm as bytes, and a search for unintended frames in the bytes that the host sent.
 //!
 //! Follows docs/protocol.md and shares no code with the parser under test.
 
@@ -123,7 +123,7 @@ impl SentStream {
     }
 
     /// True if the bytes contain a frame that the host did not intend, with a valid checksum by chance (one corrupted
-    /// frame in 65 536) or because the corruption left it intact. The model could not follow the arm after it.
+    /// frame in 65 536) or because the corruption left it intact. The model could not follow an arm that received such a frame.
     pub(super) fn has_unintended_frame(&self) -> bool {
         let is_unintended =
             |start| !self.starts.contains(&start) && self.bytes.get(start..).is_some_and(is_frame);

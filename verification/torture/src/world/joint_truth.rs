@@ -1,6 +1,6 @@
 //! The true history of a joint's servo: when it lost its torque, and when it pushed too hard.
 //!
-//! The controller notices both late, so each allows its reaction for some time afterwards (D27, D28).
+//! The controller notices both late. So its reaction is allowed for some time after each of them (D27, D28).
 
 use motion_core::servo_bus::Torque;
 use motion_core::servo_bus::frame::error;
@@ -17,8 +17,8 @@ const ENGAGE_TIME: Duration = Duration::from_millis(10_000);
 const GIVE_WAY_TIME: Duration = Duration::from_millis(7_000);
 /// The largest error by which the controller measures a push too high, in 0.1 %: it samples speed and load at different times.
 const PUSH_ERROR: i16 = 150;
-/// A joint that was let go because of heat may engage again when its servo is 5 degrees cooler (D28). Its limit is 80 degrees
-/// Celsius.
+/// A joint that was let go because of heat may engage again when its servo is 5 degrees cooler (D28) than the limit of the
+/// servo, 80 degrees Celsius.
 pub(super) const COOL: u8 = 75;
 
 /// The shortest time from the end of an alarm until its joint engages again: 500 ms (D28), less the delay of an answer.
@@ -36,8 +36,8 @@ pub(super) struct JointTruth {
     lost_at: Option<Instant>,
     /// The last time without torque.
     off_at: Instant,
-    /// The last alarm, or the last time that the servo was still hot after one. Until the alarm ends, a joint that nothing
-    /// moves counts as held (D28).
+    /// The last alarm, or the last time that the servo was still hot after one. While the alarm lasts, a joint that
+    /// does not move counts as held (D28).
     alarm_at: Option<Instant>,
     /// The last answer with an alarm that ends by itself: heat, or a wrong voltage.
     passing_alarm_at: Option<Instant>,
@@ -51,7 +51,7 @@ pub(super) struct JointTruth {
 }
 
 impl JointTruth {
-    /// Takes the last status of the servo. After an alarm the joint may be let go until the servo is cool.
+    /// Records an alarm in the last status of the servo. After an alarm the joint may be let go until the servo is cool.
     pub(super) fn reports(&mut self, now: Instant, status: StatusFields) {
         let is_hot = self.alarm_at.is_some() && status.celsius > COOL;
         if status.alarms != 0 || is_hot {
@@ -59,7 +59,7 @@ impl JointTruth {
         }
     }
 
-    /// Takes an answer of the servo.
+    /// Records an alarm that ends by itself, from an answer of the servo.
     pub(super) fn answers(&mut self, now: Instant, status: StatusFields) {
         if status.alarms & !error::OVERLOAD != 0 {
             self.passing_alarm_at = Some(now);
@@ -71,7 +71,8 @@ impl JointTruth {
         self.passing_alarm_at.is_none_or(|at| now - at >= ALARM_OVER)
     }
 
-    /// Takes the torque of the servo; `None` without power. `may_miss_orders`: frames may be lost, or reads may stay unanswered.
+    /// Records the torque of the servo; `None` without power. `may_miss_orders` is true if frames may be lost or reads may stay
+    /// unanswered.
     pub(super) fn observe(&mut self, now: Instant, torque: Option<Torque>, may_miss_orders: bool) {
         let is_on = torque == Some(Torque::On);
         self.lacks_order = !is_on && (self.lacks_order || may_miss_orders);
@@ -89,7 +90,7 @@ impl JointTruth {
         self.is_on = is_on;
     }
 
-    /// Takes the position of the servo in counts.
+    /// Records the position of the servo in counts.
     pub(super) fn stands(&mut self, now: Instant, counts: u16) {
         if counts != self.position.0 {
             self.position = (counts, now);
@@ -101,7 +102,7 @@ impl JointTruth {
         self.position.1 > then
     }
 
-    /// Takes the push of the servo and its limit in 0.1 %.
+    /// Records a push that the controller may measure as over the limit. `push` and `limit` are in 0.1 %; `None` without a limit.
     pub(super) fn pushes(&mut self, now: Instant, push: i16, limit: Option<i16>) {
         if limit.is_some_and(|limit| push.saturating_abs().saturating_add(PUSH_ERROR) > limit) {
             self.pushed_at = Some(now);
@@ -113,20 +114,20 @@ impl JointTruth {
         self.lost_at
     }
 
-    /// True if the controller need not have given torque again by now (D28): the joint was let go a moment ago.
+    /// True if the joint was let go less than [`ENGAGE_TIME`] ago, so that the controller need not have given torque again (D28).
     pub(super) fn may_wait_for_torque(&self, now: Instant) -> bool {
         self.lost_at.max(self.alarm_at).max(self.unpowered_at).is_some_and(|at| now - at < ENGAGE_TIME)
     }
 
     /// True if the controller may take the joint for let go (D28): it has an alarm, or it lost its torque or power, or an alarm
-    /// kept it from getting torque, or the order may be lost.
+    /// kept it from getting torque, or the torque command may be lost.
     pub(super) fn may_be_let_go(&self, now: Instant) -> bool {
         let has_alarm = self.alarm_at.is_some_and(|at| now - at < NOTICE_TIME);
         let had_cause = self.lost_at.max(self.alarm_at).max(self.unpowered_at).is_some();
         has_alarm || self.lacks_order || had_cause && now - self.off_at < NOTICE_TIME
     }
 
-    /// True if the set-point may give way, or gave way a moment ago (D27).
+    /// True for [`GIVE_WAY_TIME`] after a push over the limit: the set-point may give way (D27).
     pub(super) fn may_give_way(&self, now: Instant) -> bool {
         self.pushed_at.is_some_and(|at| now - at < GIVE_WAY_TIME)
     }

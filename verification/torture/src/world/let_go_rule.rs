@@ -16,7 +16,7 @@ struct Freed {
     /// True if the target does not follow the position yet: the answer that shows that a servo let go may be newer than the
     /// target. The next answer moves the target.
     is_behind: bool,
-    /// The number of times that the host had written its target.
+    /// The number of times that the host has written the target.
     writes: u64,
 }
 
@@ -64,8 +64,8 @@ mod tests {
 
     const JOINT: Joint = Joint::ALL[1];
 
-    /// Joint 2 is let go at 90 degrees, and falls to 80 and to 70 degrees. There its target is `target`, and the host has
-    /// written it `writes` times.
+    /// Joint 2 is let go at 90 degrees, and falls to 80 and to 70 degrees. At 70 degrees its target is `target`, and the
+    /// host has written the target `writes` times.
     fn check(target: u8, writes: u64) -> Check {
         let mut registers = RegisterFile::new([0; 6], None);
         registers.set(PROTECTION, 1);

@@ -11,7 +11,8 @@ pub(crate) enum LimitVerdict {
     Allowed,
     /// Refused because of this register.
     Refused(u8),
-    /// The outcome depends on set-points or measured targets. A refusal would name this register.
+    /// The outcome depends on set-points, or on targets that a measured position may have replaced. A refusal would name this
+    /// register.
     Unknown(u8),
 }
 

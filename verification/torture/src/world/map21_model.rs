@@ -4,9 +4,9 @@ use kinematics::{Vector, ik5, ik6, ik7};
 
 /// The first register of the offsets, and the first after them.
 const OFFSETS: (u8, u8) = (13, 20);
-/// The first register of the wrist.
+/// The first register of the position of the wrist.
 const WRIST: u8 = 68;
-/// The first register of the tip.
+/// The first register of the position of the tip.
 const TIP: u8 = 54;
 
 /// A write has a position that no joint angles reach (M7).
@@ -18,7 +18,7 @@ pub(super) struct OutOfReach {
     pub(super) kind: u8,
 }
 
-/// True if a write of map 2.1 has an effect there, with an open lock (M2).
+/// True if a write of map 2.1 has an effect on the register `at`, with an open lock (M2).
 pub(super) const fn is_writable(at: u8) -> bool {
     matches!(at, 11..=20 | 28..=52 | 54..=66 | 68..=73 | 82 | 90)
 }
@@ -82,7 +82,7 @@ pub(super) fn angles(address: u8, values: &[u8]) -> Result<[Option<f32>; 7], Out
     Ok(angles)
 }
 
-/// The first register of the blocks that a write covers.
+/// The first register of the first position block that a write covers: the tip before the wrist. Use only if it covers one.
 pub(super) fn block_of(address: u8, values: &[u8]) -> u8 {
     if block::<9>(address, values, TIP).is_some() { TIP } else { WRIST }
 }

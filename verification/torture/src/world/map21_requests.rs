@@ -3,14 +3,14 @@
 use super::host_request::HostRequest;
 use crate::seeded_rng::SeededRng;
 
-/// Converts a write of map 2.2 to a write of the same registers in map 2.1. Most writes are made in this way, so that both
-/// maps change the same registers.
+/// Converts a write of map 2.2 to a write of the same registers in map 2.1. About half of the writes of map 2.1 are made
+/// in this way, so that both maps change the same registers.
 pub(super) fn of_map22(request: (u8, Vec<u8>)) -> HostRequest {
     let (address, values) = request;
     HostRequest::WriteMap21 { address, values }
 }
 
-/// A write of the registers that only map 2.1 has.
+/// A write in map 2.1, in most cases of registers that only this map can write.
 pub(super) fn write(rng: &mut SeededRng) -> HostRequest {
     let (address, values) = match rng.below(16) {
         0..=3 => (68, position(rng)),

@@ -66,11 +66,11 @@ use state::{PendingRequest, PowerState, PoweredArm};
 use status_checker::StatusChecker;
 use supply_rule::SupplyRule;
 
-/// The host pauses while this many requests are not executed.
+/// The host pauses while more than this many requests are not executed.
 const MAX_PENDING: usize = 64;
-/// The host pauses while the bytes on its line need longer than this.
+/// The host pauses while the bytes on its line need longer than this to arrive.
 const MAX_QUEUE_TIME: Duration = Duration::from_millis(200);
-/// A pause of the host.
+/// The length of such a pause.
 const HOST_PAUSE: Duration = Duration::from_millis(100);
 
 /// A world that violated a rule.

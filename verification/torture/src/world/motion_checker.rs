@@ -11,7 +11,7 @@
 //!
 //! After a loss of power, torque comes back with a goal of the controller, never by itself (D29).
 //!
-//! A joint with a payload, or that meets an obstacle or a hand, may be past its goals as long as its servo drives it back.
+//! A joint that carries a payload, or meets an obstacle or a hand, may be past its goals while its servo drives it back.
 //!
 //! A joint yields to its load: it droops, and when the controller alone restarts, the measured position is its new goal
 //! and it droops once more. With a payload it also runs past its goal. The tolerance follows from the load and the speed
@@ -31,7 +31,7 @@ pub(super) use bounds::Exemption;
 use bounds::{AngleRange, JointBounds};
 use received_commands::{DecodedCommand, ReceivedCommands, millidegrees};
 
-/// The time between two checks. The heaviest joint, if it falls, exceeds the tolerance in 30 ms.
+/// The time between two checks. A fall of the joint with the heaviest load exceeds the tolerance within 30 ms.
 const CHECK_PERIOD: Duration = Duration::from_millis(5);
 /// Millidegrees per second by which the range shrinks behind the joint. A servo far from its goal moves at 372 degrees/s.
 const SHRINK_PER_SECOND: u64 = 80_000;
@@ -70,7 +70,8 @@ impl MotionChecker {
         bounds.awaits_goal &= exemption == Exemption::PowerLoss;
     }
 
-    /// The set-point of a joint that pushes may come back at once (D27), or fast from far behind a wall.
+    /// Allows [`RECOIL`] more in this period, because the set-point of a joint that pushes may come back at once (D27), or fast
+    /// from far behind a wall.
     pub(super) fn may_recoil(&mut self, joint: Joint, plant: &Plant) {
         let [largest, _] = &mut self.joints[joint].yields;
         *largest = (*largest).max(yield_of(joint, plant).saturating_add(RECOIL));
@@ -92,7 +93,8 @@ impl MotionChecker {
         self.exempt_all(now, Exemption::PowerLoss);
     }
 
-    /// Applies the commands in `received`: the frame `sent`, as the servos receive it after disturbances.
+    /// Applies the commands in `received`: the frame `sent`, as the servos receive it after disturbances. Exempts all joints if
+    /// the two differ.
     pub(super) fn frame_sent(&mut self, now: Instant, sent: &[u8], received: &[u8]) {
         if sent != received {
             self.exempt_all(now, Exemption::Noise);
@@ -268,7 +270,7 @@ mod tests {
 
     #[test]
     fn a_servo_that_was_hot_may_hold_its_goal_again_by_itself() {
-        // Without weight, so that it stands still meanwhile.
+        // This joint carries no weight, so it stands still without torque.
         let joint = Joint::ALL[0];
         let cools = |arm: &mut ScriptedArm| {
             assert!(!arm.bus.has_torque(joint));
@@ -282,7 +284,7 @@ mod tests {
         arm.bus.trip(arm.now, joint, Trip::Heat);
         arm.run(100).unwrap();
         assert_eq!(cools(&mut arm), Ok(()));
-        // It restarts hot, and is given a goal and torque while the alarm lasts.
+        // The servo restarts hot, and receives a goal and torque while the alarm lasts.
         arm.bus.trip(arm.now, joint, Trip::Heat);
         arm.bus.restart_servo(arm.now, joint);
         arm.run(1_000).unwrap();

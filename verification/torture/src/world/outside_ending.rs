@@ -13,6 +13,6 @@ pub(super) enum Ending {
     Thing,
     /// The supply is back.
     Stop,
-    /// The servo has another overload.
+    /// Another overload is forced on the servo.
     Trip(Joint),
 }

@@ -86,7 +86,7 @@ impl TortureWorld {
         (self.bus.angle(joint) + distance).clamp(0, 180_000)
     }
 
-    /// Stiff, or 10 to 1000 mN m per degree.
+    /// `None` for a stiff obstacle, or 10 to 1000 mN m per degree.
     fn stiffness(&mut self) -> Option<u16> {
         let soft = u16::try_from(10 + self.rng.below(991)).unwrap_or(10);
         if self.rng.one_in(2) { None } else { Some(soft) }
@@ -143,7 +143,7 @@ impl TortureWorld {
         self.generator.only_read_until(at + TRIP_PERIOD);
     }
 
-    /// Cuts the supply of the servos.
+    /// Cuts the supply of the servos for one of the times in [`STOPS`], and delays the next fault until after the stop.
     fn stop(&mut self) {
         let millis = self.rng.one_of(&STOPS, 300);
         let until = self.now + Duration::from_millis(millis);

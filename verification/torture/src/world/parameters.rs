@@ -1,4 +1,5 @@
-//! The parameters that differ between worlds: sector size, servo timeout, torque codes and the shell's timing.
+//! The parameters that differ between worlds: sector size, servo timeout, torque codes, the effect of a servo's first goal, and
+//! the shell's timing.
 
 use arm_sim::servo::ServoConfig;
 use motion_core::TorqueCodes;
@@ -14,7 +15,7 @@ pub(super) struct WorldParameters {
     sector: usize,
     pub(super) servo_timeout: Duration,
     pub(super) torque_codes: TorqueCodes,
-    /// After a restart of a servo, its first goal switches its torque on.
+    /// True if the first goal after a restart of a servo switches its torque on.
     goal_starts_torque: bool,
     /// The largest delay of a wake-up of the shell.
     pub(super) jitter: Duration,

@@ -90,7 +90,8 @@ impl TortureWorld {
         Ok(())
     }
 
-    /// Drops the controller and the requests that it has not executed.
+    /// Ends the controller by a power cut or a restart, and drops the requests that it has not executed. The controller starts
+    /// again after a random time.
     pub(super) fn power_down(&mut self, arm: &PoweredArm, servos_too: bool) {
         self.supply_rule.forget();
         self.counts.power_cuts += 1;

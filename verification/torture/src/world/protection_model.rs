@@ -5,7 +5,7 @@ use protocol_core::registers::map::EFFECTOR_TYPE;
 
 /// 1: the limits act (D27).
 pub(super) const PROTECTION: u8 = 192;
-/// The limit of joints 1 to 6 in percent.
+/// The limit of joints 1 to 6, and of joint 7 without a gripper, in percent.
 pub(super) const PUSH_LIMIT: u8 = 193;
 /// The limit of a gripper in percent.
 pub(super) const GRIP_LIMIT: u8 = 194;

@@ -1,4 +1,5 @@
-//! Checks that no servo's own overload protection acts while the controller limits its push, and that no push lasts (D27).
+//! Checks that no servo's own overload protection acts while the controller limits its push, and that no push over
+//! the limit lasts (D27).
 //!
 //! The rule binds while the controller can limit: the servo responds, the bus is undisturbed, the shell runs, and the limit
 //! is at most 75 %.
@@ -27,7 +28,7 @@ pub(super) struct Push {
     pub(super) permille: i16,
     /// The speed in 0.1 % of the highest speed. It has the sign of the push if both have the same direction.
     pub(super) speed: i16,
-    /// The limit; `None` if the controller cannot limit.
+    /// The limit of the push in 0.1 %; `None` if the controller cannot limit it.
     pub(super) limit: Option<i16>,
     /// The servo's overload protection has switched it off.
     pub(super) is_overloaded: bool,
@@ -49,7 +50,7 @@ impl PushRule {
         self.was_overloaded = true;
     }
 
-    /// Checks the joint.
+    /// Checks the push and the overload protection of the joint.
     pub(super) fn check(&mut self, now: Instant, joint: Joint, push: Push) -> Check {
         let limit = push.limit.filter(|limit| *limit <= HIGHEST_LIMIT);
         if limit.is_none() {

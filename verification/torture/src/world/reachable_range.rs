@@ -5,7 +5,7 @@ use protocol_core::time::{Duration, Instant};
 
 /// One count in the unit of the arithmetic here, 1e-9 counts.
 const NANOCOUNTS: i64 = 1_000_000_000;
-/// A late shell catches up one control cycle, and the present cycle may be incomplete.
+/// Two control cycles: a set-point makes up for one cycle after a late wake-up, and the present cycle may be incomplete.
 const SLACK: Duration = Duration::from_millis(20);
 /// Rounding to whole counts at both ends of a move.
 const ROUNDING: i64 = NANOCOUNTS + NANOCOUNTS / 100;

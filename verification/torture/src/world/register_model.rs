@@ -1,4 +1,5 @@
-//! A model of the registers, written only from docs/protocol.md, without measured values such as positions.
+//! A model of the registers without measured values such as positions. Its rules come from docs/protocol.md, and its addresses,
+//! ranges and defaults from the register map.
 
 mod comparison;
 pub(crate) mod limits;
@@ -290,7 +291,7 @@ impl RegisterModel {
         }
     }
 
-    /// True if fine targets were the points of a stream at any time since power-up (D23).
+    /// True if the set-point period was not 0 at any time since power-up, so that fine targets may be points of a stream (D23).
     pub(crate) const fn has_streams(&self) -> bool {
         self.has_streams
     }
@@ -329,7 +330,7 @@ impl RegisterModel {
         self.get(extended_model::REPORT_CONTENT)
     }
 
-    /// The limit of a joint's push in 0.1 % of the stall torque; `None` without protection (D27).
+    /// The limit of a joint's push in 0.1 % of the stall torque; `None` without protection or outside motor state servo (D27).
     pub(crate) fn push_limit(&self, joint: Joint) -> Option<i16> {
         protection_model::limit(joint, |at| self.get(at)).filter(|_| self.is_servo())
     }

@@ -26,7 +26,7 @@ impl ReportStream {
         }
     }
 
-    /// The function code of its frames, and their registers: the first, and how many. `content` is register 189.
+    /// The function code, the first register and the number of registers of the stream's frames. `content` is register 189.
     pub(super) const fn frame(self, content: u8) -> (u8, u8, u8) {
         match (self, content) {
             (Self::Positions, 0) => (3, 54, 7),

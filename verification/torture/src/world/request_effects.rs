@@ -27,7 +27,7 @@ impl PoweredArm {
 
 impl TortureWorld {
     /// Applies the next `count` requests to the model. `room` is the room of the link, in bytes. The effect of the last one
-    /// is owed from then on; frames to the servos may come before it.
+    /// is owed from then on; frames to the servos may come before it. Compares the model with the arm's registers.
     pub(super) fn apply_requests(&mut self, arm: &mut PoweredArm, count: u16, room: usize) -> Check {
         self.record_missing(arm);
         self.record_lost_supply(arm)?;
@@ -169,7 +169,7 @@ impl TortureWorld {
             self.log.event(self.now, "the watchdog damps the arm".to_owned());
             arm.model.damp();
             self.record_damping(arm);
-            // The arm is in state 0 already, whatever becomes of its supply.
+            // The arm is in state 0 already, so the end of an emergency stop has no effect that could be checked.
             self.supply_rule.forget();
         }
     }

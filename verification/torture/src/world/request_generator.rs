@@ -1,4 +1,4 @@
-//! Generates the requests of the host: any request, at any rate, with any corruption.
+//! Generates the requests of the host: reads and writes of all registers, at varying rates, some with corruption.
 
 use protocol_core::registers::map::{
     DEVICE_ID, EEPROM_LOCK, FEEDBACK_FREQUENCY, MOTOR_STATE, OFFSET, PRESENT_POSITION, SPEED, STATUS_VERSION,
@@ -20,11 +20,12 @@ const EXTENDED: (usize, usize) = (128, 199);
 /// The kinds of requests that the host of a world sends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct HostHabits {
-    /// Half of the writes are in map 2.1. The other worlds have map 2.2 only.
+    /// True if half of the writes are in map 2.1, false if none are.
     both_maps: bool,
-    /// A quarter of the other writes are in the extended block.
+    /// True if a quarter of the writes in map 2.2 are generated for the extended block, false if no write reaches it or the
+    /// protection block.
     extended_block: bool,
-    /// The host only reads for half of the time.
+    /// True if the host only reads for about half of the time.
     pauses: bool,
 }
 
@@ -89,7 +90,7 @@ impl RequestGenerator {
         self.next_at = self.next_at.max(now);
     }
 
-    /// The host only reads until then.
+    /// The host only reads until this time.
     pub(super) fn only_read_until(&mut self, until: Instant) {
         (self.only_reads, self.rate_until) = (true, until);
     }
@@ -203,7 +204,7 @@ fn leave_out((from, to): (usize, usize), address: u8, values: &mut Vec<u8>) {
     }
 }
 
-/// Any motor state: servo twice as often as the others.
+/// A motor state: servo twice as often as each of the others.
 fn state(rng: &mut SeededRng) -> u8 {
     let states = [motor_state::DAMPING, motor_state::SERVO, motor_state::SERVO, motor_state::FORCELESS];
     rng.one_of(&states, motor_state::SERVO)
@@ -232,7 +233,7 @@ fn pose(rng: &mut SeededRng) -> (u8, Vec<u8>) {
     (MOTOR_STATE.address, values.collect())
 }
 
-/// Settings or the lock. One write in a few is out of range.
+/// A write of settings or of the lock. A few are out of range.
 fn settings(rng: &mut SeededRng) -> (u8, Vec<u8>) {
     match rng.below(6) {
         0 | 1 => (EEPROM_LOCK.address, vec![u8::from(rng.one_in(6))]),

@@ -30,7 +30,7 @@ pub(super) struct ScriptedArm {
     pub(super) model: RegisterModel,
     pub(super) registers: RegisterFile,
     pub(super) checker: CommandChecker,
-    /// The controller runs and knows its servos.
+    /// True if the controller runs, knows its servos and protects them.
     pub(super) is_guarded: bool,
     /// The limit of all pushes in 0.1 %, if there is one.
     pub(super) push_limit: Option<i16>,
@@ -64,7 +64,7 @@ impl ScriptedArm {
         arm
     }
 
-    /// Restarts the controller alone.
+    /// Restarts the controller alone, and lets its start-up time pass.
     pub(super) fn restart_controller(&mut self) {
         self.checker = CommandChecker::new(self.now, TorqueCodes::default(), TIMEOUT);
         self.run(600).unwrap();

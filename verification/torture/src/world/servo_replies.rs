@@ -12,7 +12,7 @@ use crate::per_joint::PerJoint;
 /// Start-up ends if each servo has sent this many replies.
 const START_UP_REPLIES: u8 = 2;
 /// Servos that were silent for a second count as restarted (D29). The margin of 100 ms is for the controller, whose second
-/// does not start when a read is sent, but when it fails.
+/// starts when a read fails, not when it is sent.
 const LOST_AFTER: Duration = Duration::from_millis(900);
 /// The end of a silence may have effects for this long.
 const NOTICE_TIME: Duration = Duration::from_millis(3_000);
@@ -37,7 +37,7 @@ struct Known {
     silence: (Instant, Instant),
     /// A driven servo left a question unanswered, and its torque was not read since then.
     is_doubtful: bool,
-    /// True if the servo was driven at the last read that no unanswered read preceded.
+    /// True if the servo was driven at the last read that followed an answered read.
     is_driven: bool,
     /// True if its torque was read as on since it was last switched on or refreshed.
     is_read_on: bool,
@@ -98,7 +98,7 @@ impl ServoReplies {
         self.decoder.clear();
     }
 
-    /// Takes bytes that the controller receives.
+    /// Decodes bytes that the controller receives, and records the reply to the last read.
     pub(super) fn received(&mut self, now: Instant, bytes: &[u8]) {
         for piece in bytes.chunks(Decoder::CAPACITY / 2) {
             self.decoder.push(piece);
@@ -130,13 +130,13 @@ impl ServoReplies {
         self.servos[joint].position
     }
 
-    /// The lowest and the highest measured positions from which the next goal may be computed. A position just before the last
-    /// goal may have come too late for that goal: goals are computed once in each control cycle.
+    /// The lowest and the highest measured positions from which the next goal may be computed. A position that was read
+    /// shortly before the last goal may have come too late for that goal, because goals are computed once in each control cycle.
     pub(super) fn positions(&self, joint: Joint) -> impl Iterator<Item = u16> {
         self.servos[joint].positions.into_iter().flatten().flat_map(|(lowest, highest)| [lowest, highest])
     }
 
-    /// The servo is sent a goal.
+    /// Records that a goal is sent to the servo.
     pub(super) fn goal_is_sent(&mut self, joint: Joint) {
         let [since_goal, before] = self.servos[joint].positions;
         self.servos[joint].positions = [None, since_goal.or(before)];
@@ -152,9 +152,9 @@ impl ServoReplies {
         self.servos[joint].is_doubtful
     }
 
-    /// For how long the set-point of a joint may have moved since the last goal of its servo. It moves after that goal and
-    /// after the end of each doubt until a read fails, which takes at most `until_doubt`. Has to be called for each goal,
-    /// because it resets the number of ended doubts.
+    /// The time in which the set-point of a joint may have moved since the last goal of its servo. The set-point moves after
+    /// that goal and after the end of each doubt, until a read fails, at most for `until_doubt`. Call this for each goal, because
+    /// it resets the number of ended doubts.
     pub(super) fn take_trusted_time(
         &mut self,
         joint: Joint,
@@ -220,7 +220,7 @@ impl Known {
         self.silent_since.is_some_and(|since| now - since >= LOST_AFTER)
     }
 
-    /// Takes an answer. Returns whether it shows torque.
+    /// Records an answer. Returns true if it shows torque.
     fn answered(&mut self, now: Instant, params: &[u8], on: u8) -> bool {
         self.replies = self.replies.saturating_add(1);
         self.unanswered = 0;

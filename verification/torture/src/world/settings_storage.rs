@@ -12,7 +12,7 @@ use crate::violation::{Check, Violation, ensure};
 
 /// Bytes of a sector of the reference board.
 pub(super) const BOARD_SECTOR: usize = 16_384;
-/// The least number of saves between two starts that such sectors have room for.
+/// Two sectors of [`BOARD_SECTOR`] bytes have room for at least this many saves between two starts (D19).
 const MIN_SAVES: u32 = 600;
 
 /// A flash that outlives the controller.
@@ -132,7 +132,7 @@ impl<const SECTOR: usize> FlashSettings<SECTOR> {
         self.flash.0.borrow().flash.is_powered()
     }
 
-    /// Checks that only a worn or full flash refuses settings.
+    /// Checks that a good flash is not broken, and that the sectors of the board are not full before [`MIN_SAVES`] saves.
     fn check_storage(&self, storage: Storage) -> Check {
         let early = storage == Storage::Full && SECTOR == BOARD_SECTOR && self.saves < MIN_SAVES;
         ensure(self.is_worn || storage != Storage::Broken && !early, || {

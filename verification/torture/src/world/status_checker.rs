@@ -1,5 +1,5 @@
-//! Checks the status block, the positions, the reports and the valve against the true state of the arm, four times a
-//! second of virtual time.
+//! Checks the status block, the positions, the torque, the reports, the watchdog and the valve against the true state of the
+//! arm, four times a second of virtual time.
 //!
 //! The constants below state how long the arm may take until its status is right.
 

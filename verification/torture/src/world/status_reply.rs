@@ -3,7 +3,7 @@
 use motion_core::servo_bus::frame::Reading;
 use protocol_core::registers::Joint;
 
-/// The registers from the torque switch to the measurements.
+/// The number of registers from the torque switch to the measurements.
 const TO_MEASUREMENTS: usize = 16;
 
 /// The fields of a servo's last reply, before any corruption.

@@ -7,21 +7,21 @@ use protocol_core::time::{Duration, Instant};
 use super::extended_model::WATCHDOG_ACTION;
 use crate::violation::{Check, ensure};
 
-/// The watchdog acts within 10 ms; a control cycle and a late wake-up of the shell come on top.
+/// The watchdog acts within 10 ms. A control cycle and a late wake-up of the shell add to this.
 const ACTS_WITHIN: Duration = Duration::from_millis(30);
 
 /// The watchdog of the host link.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct WatchdogModel {
     timeout: Duration,
-    /// The watchdog acts at this time unless a request comes before; `None` while it is off.
+    /// The watchdog acts at this time unless a request arrives earlier; `None` while it is off.
     due: Option<Instant>,
     /// True if a silence was long enough since register 186 was written.
     may_have_acted: bool,
 }
 
 impl WatchdogModel {
-    /// No watchdog.
+    /// The watchdog of an arm after its start: off.
     pub(crate) const OFF: Self = Self { timeout: Duration::ZERO, due: None, may_have_acted: false };
 
     /// Register 186 was written: the time begins, and the fault bit is cleared.

@@ -8,7 +8,7 @@ use protocol_core::wire::MAX_LENGTH;
 use super::invariants::InvariantChecker;
 use super::scripted_replies::{ScriptedReplies, decode};
 
-/// A hundred thousand years. Later deadlines would overflow.
+/// The latest time in microseconds, about 146,000 years. Later deadlines would overflow.
 const END_OF_TIME_US: u64 = 1 << 62;
 
 pub struct ControllerLoop {
@@ -117,7 +117,8 @@ impl ControllerLoop {
         None
     }
 
-    /// Runs until all waiting bytes are processed. The host link is empty and the host is silent.
+    /// Empties the host link and runs the loop 40 times without new bytes. Panics if host bytes still wait, or if a setting is
+    /// not saved.
     pub fn finish(&mut self) {
         self.room = 4_096;
         self.run(40);

@@ -1,4 +1,4 @@
-//! Checks the registers of the extended block that a reply shows, after any writes (D21).
+//! Checks the fine targets and positions that a reply shows against the coarse ones, after any writes (D21).
 
 use protocol_core::registers::map::{
     FINE_POSITION, FINE_TARGET, MEASURED_JOINTS, PRESENT_POSITION, TARGET_POSITION,

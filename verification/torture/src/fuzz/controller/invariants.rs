@@ -1,5 +1,6 @@
-//! The invariants: replies match the registers, goals do not jump and keep the linkage, torque is off outside motor state
-//! servo, the valve closes, and the status block and the extended block are right.
+//! The invariants: replies match the registers and come after the save of settings, goals do not jump and keep the linkage,
+//! torque is off outside motor state servo, the valve closes, registers stay in their ranges, storage errors are flagged, and
+//! fine targets and positions match the coarse ones.
 
 use motion_core::calibration::{MicroDegrees, angle_from_counts};
 use motion_core::servo_bus::Torque;
@@ -39,7 +40,7 @@ pub struct InvariantChecker {
     calls: u32,
     joints: [JointGoal; 7],
     is_driven: [bool; 7],
-    /// The time since which the motor state is not servo, in microseconds.
+    /// The time of the first wait in a motor state other than servo, in microseconds; `None` in servo and after a torque-on.
     released_at: Option<u64>,
     valve_opened_at: Option<u64>,
     vacuum: Vacuum,
@@ -65,7 +66,7 @@ impl InvariantChecker {
         }
     }
 
-    /// Checks that a frame to the host is complete, and that its values match the registers.
+    /// Checks that a frame to the host is complete, that its values match the registers, and that the settings were saved before.
     pub fn frame_to_host(&self, bytes: &[u8], registers: &RegisterFile) {
         let ParseOutcome::Complete(reply, length) = parse::<ToHost>(bytes) else {
             panic!("{bytes:?} is not a frame")
@@ -140,15 +141,16 @@ impl InvariantChecker {
         assert!(!is_on || check.is_ok(), "{check:?}");
     }
 
-    /// Checks that the joint can reach a goal from the last one in the time between them, or that it is at the joint's position.
+    /// Checks that the joint can reach the goal from its last goal in the time between them, or that the goal is at the joint's
+    /// position.
     fn goal_command(&mut self, now_us: u64, id: u8, counts: u16, position: u16, registers: &RegisterFile) {
         let Some(joint) = Joint::from_index(id) else { panic!("there is no servo {id}") };
         assert_eq!(registers.get(MISSING_SERVOS.address) & joint.bit(), 0, "{joint:?} is missing");
         let state = &mut self.joints[usize::from(id)];
         let calls = self.calls;
         let is_near = |(before, at, call): (u16, u64, u32)| {
-            // Two more cycles: the controller may catch up with a late one, and one may just have ended. Each cycle needs
-            // a poll.
+            // Two more cycles, because the controller may make up for a late cycle, and another cycle may end now. Each
+            // cycle needs a poll.
             let cycles = ((now_us - at) / CYCLE_US + 2).min((calls - call).into());
             f64::from(before.abs_diff(counts)) <= state.max_speed * cycles as f64 + 2.0
         };
@@ -176,7 +178,7 @@ impl InvariantChecker {
         (self.settings, self.storage) = (settings, storage);
     }
 
-    /// Checks the state after every poll.
+    /// Counts a poll, and keeps the highest speed limit of each joint since its last goal.
     pub fn after_poll(&mut self, registers: &RegisterFile) {
         self.calls += 1;
         for (joint, state) in Joint::ALL.into_iter().zip(&mut self.joints) {
@@ -184,7 +186,7 @@ impl InvariantChecker {
         }
     }
 
-    /// Checks the state when the controller waits.
+    /// Checks registers, valve and torque when the controller waits, and counts the poll.
     pub fn after_wait(&mut self, now_us: u64, registers: &RegisterFile) {
         self.after_poll(registers);
         // Offsets are not checked: after a write in map 2.1 they have the encoding of that map.
@@ -206,7 +208,7 @@ impl InvariantChecker {
         self.check_release(now_us, registers);
     }
 
-    /// Checks that torque is switched off as soon as the servo bus is free.
+    /// Checks that torque is switched off within the servo timeout and 2 ms, once the motor state is not servo.
     fn check_release(&mut self, now_us: u64, registers: &RegisterFile) {
         if registers.get(MOTOR_STATE.address) == motor_state::SERVO {
             self.released_at = None;

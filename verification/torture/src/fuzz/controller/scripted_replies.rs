@@ -71,7 +71,7 @@ impl ScriptedReplies {
     }
 }
 
-/// Decodes a command of the controller: exactly one frame, of one of three kinds.
+/// Decodes a command of the controller. Panics unless `bytes` are exactly one frame of one of the three kinds.
 pub fn decode(bytes: &[u8]) -> ServoCommand {
     let mut decoder = Decoder::new();
     decoder.push(bytes);

@@ -94,7 +94,8 @@ impl CommandChecker {
         context.bus.has_torque(joint) && context.bus.servo_goal(joint).abs_diff(goal) <= 1
     }
 
-    /// Checks that a servo without torque holds the last goal that was sent to it. With torque it would go to an older one.
+    /// Checks that a servo without torque holds the last goal that was sent to it. Otherwise torque would drive it to an older
+    /// goal.
     fn check_servo_goal(&self, joint: Joint, goal: u16, context: &CommandContext<'_>) -> Check {
         let bus = context.bus;
         let held = bus.servo_goal(joint);
@@ -116,7 +117,7 @@ impl CommandChecker {
     }
 
     /// Checks that a joint that was let go engages at most three times in a minute, unless register 29 is written (D28). A test
-    /// of motion-core checks that it then waits for the host, also after the minute.
+    /// of motion-core checks that the joint waits for the host after the third time, also after the minute.
     fn check_attempts(&mut self, joint: Joint, context: &CommandContext<'_>) -> Check {
         // The servo of a joint that fell silent may have restarted unnoticed. Such a joint is not let go.
         if self.was_silent(joint) || !self.was_let_go(joint, context) {

@@ -7,8 +7,8 @@ use crate::per_joint::PerJoint;
 
 /// The controller may accept a false reading if two undetected errors come within this time.
 const MISREAD_TIME: Duration = Duration::from_millis(1_000);
-/// The largest error in counts of a false reading that the controller accepts alone: the motion of a joint at rest, and of one
-/// that sinks slowly and is read four times a second.
+/// The largest error in counts of a single false reading that the controller accepts: 8 for a joint at rest, and 15 more for a
+/// joint that sinks slowly and is read four times a second.
 const TOLERANCE: u64 = 8 + 15;
 
 /// The undetected errors of all servos.
@@ -42,8 +42,8 @@ impl Misreadings {
         self.used_until[joint]
     }
 
-    /// The accepted error of a position reading, in counts. The controller may accept a single undetected error if it is
-    /// no larger than the motion of a joint at rest.
+    /// The accepted error of a position reading, in counts: [`TOLERANCE`] for [`MISREAD_TIME`] after an undetected error,
+    /// otherwise 0.
     pub(super) fn tolerance(&self, joint: Joint, now: Instant) -> u64 {
         if self.was_error(joint, now) { TOLERANCE } else { 0 }
     }

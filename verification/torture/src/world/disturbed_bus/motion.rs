@@ -9,17 +9,17 @@ use crate::violation::Check;
 use crate::world::motion_checker::Exemption;
 use crate::world::push_rule::Push;
 
-/// Half of the longest servo timeout with which silent servos do not delay the readings of the others.
+/// Half of 5 ms. With servo timeouts of up to 5 ms, the responding servos are read often enough while others are silent.
 const SHORT: Duration = Duration::from_micros(2_500);
 
 impl DisturbedBus {
-    /// Exempts all joints from the motion check: the motor state is not servo.
+    /// Exempts all joints from the motion check, because the motor state is not servo.
     pub(crate) fn exempt_all_by_state(&mut self, now: Instant) {
         self.motion_checker.exempt_all(now, Exemption::MotorState);
     }
 
-    /// Checks that no joint has moved by itself. `is_guarded` tells that the controller runs and protects the servos.
-    /// `limits` are the push limits in 0.1 %; `None` without protection.
+    /// Checks that no joint has moved by itself or pushes too hard, and records the true state of each joint. `is_guarded` tells
+    /// that the controller runs and protects the servos. `limits` are the push limits in 0.1 %; `None` without protection.
     pub(crate) fn check_motion(
         &mut self,
         now: Instant,
@@ -27,7 +27,7 @@ impl DisturbedBus {
         is_guarded: bool,
         limits: PerJoint<Option<i16>>,
     ) -> Check {
-        // The joints move while the controller is off, too.
+        // Simulate the joints up to now, because they move while the controller is off, too.
         self.plant.bytes(now, &[]);
         if !is_servo {
             self.truths = PerJoint::default();

@@ -9,7 +9,7 @@ use super::{BOOT_TIME, DisturbedBus};
 use crate::per_joint::PerJoint;
 use crate::world::motion_checker::Exemption;
 
-/// A step of the plant. A servo starts in the first one that has supply, so up to a step late.
+/// A step of the plant. A servo starts in the first step with supply, so up to one step late.
 const STEP: Duration = Duration::from_millis(1);
 
 impl DisturbedBus {

@@ -28,13 +28,13 @@ impl ReplyComparison {
         Self { sent: Decoder::new(), received: Decoder::new(), sent_replies: VecDeque::new() }
     }
 
-    /// The controller asks a servo, and forgets the bytes that it received before.
+    /// The controller asks a servo, and forgets the bytes of an incomplete reply.
     pub(super) fn asked(&mut self) {
         self.sent.clear();
         self.received.clear();
     }
 
-    /// Takes bytes that the servos send.
+    /// Records the replies in the bytes that the servos send.
     pub(super) fn sent(&mut self, bytes: &[u8]) {
         for reply in replies(&mut self.sent, bytes) {
             if self.sent_replies.len() == MAX_KEPT {
@@ -44,7 +44,7 @@ impl ReplyComparison {
         }
     }
 
-    /// Takes bytes that the controller receives. Returns the joints of replies that no servo sent.
+    /// Decodes bytes that the controller receives. Returns the joints of replies that no servo sent.
     pub(super) fn received(&mut self, bytes: &[u8]) -> Vec<Joint> {
         let received = replies(&mut self.received, bytes);
         let is_false = |reply: &Reply| !self.sent_replies.contains(reply);

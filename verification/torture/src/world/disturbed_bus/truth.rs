@@ -48,7 +48,7 @@ impl DisturbedBus {
         self.plant.torque(joint) == Some(Torque::On)
     }
 
-    /// True if all servos respond and have torque.
+    /// True if all servos have responded for [`SETTLED`] and hold torque, and the controller cannot take one for let go.
     pub(crate) fn all_hold(&self, now: Instant) -> bool {
         let responds = |joint: Joint| matches!(self.availability(joint), Availability::Responding(since) if now - since > SETTLED);
         let holds =
@@ -71,8 +71,7 @@ impl DisturbedBus {
         self.misreadings.may_be_used(joint, now)
     }
 
-    /// The accepted error of a position reading, in counts. The controller may accept a single undetected error if it is
-    /// no larger than the motion of a joint at rest.
+    /// The accepted error of a position reading, in counts: above 0 for some time after an undetected error.
     pub(crate) fn position_tolerance(&self, joint: Joint, now: Instant) -> u64 {
         self.misreadings.tolerance(joint, now)
     }

@@ -1,4 +1,4 @@
-//! Where a joint may be: the range of its goals, which shrinks behind it.
+//! The angles at which a joint may be: the range of its goals, which shrinks behind the joint.
 
 use protocol_core::time::Instant;
 
@@ -17,7 +17,7 @@ pub(crate) enum Exemption {
     Alarm,
     /// The motor state is not servo.
     MotorState,
-    /// A hand turns it, or something holds it.
+    /// A hand turns the joint, or something holds it.
     Hand,
     /// The panic handler switched the servos to damping.
     Panic,
@@ -63,20 +63,21 @@ impl AngleRange {
 pub(super) struct JointBounds {
     /// Why the joint may move without a goal, and the earliest end of the exemption.
     pub(super) exemption: Option<(Exemption, Instant)>,
-    /// The last goal that its servo has received since it has had power.
+    /// The last goal that its servo has received since it had power and since the start of an exemption other than an alarm, in
+    /// millidegrees.
     pub(super) goal: Option<i32>,
     /// True if its servo had no power, and has received no goal since then.
     pub(super) awaits_goal: bool,
     /// The goals of the present period of 100 ms, and of the period before.
     pub(super) goals: [AngleRange; 2],
     pub(super) range: AngleRange,
-    /// Until then the joint may run past its goals if its servo drives it back.
+    /// Until this time the joint may run past its goals if its servo drives it back.
     pub(super) overruns_until: Instant,
     /// True if its servo had torque at the last check.
     pub(super) had_torque: bool,
-    /// How far it was outside its range at the last check.
+    /// How far the joint was outside its range at the last check, in millidegrees. Negative inside.
     pub(super) excess: i32,
-    /// The greatest yield in the present period, and in the period before.
+    /// The greatest yield in the present period, and in the period before, in millidegrees.
     pub(super) yields: [i32; 2],
 }
 

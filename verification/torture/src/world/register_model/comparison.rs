@@ -31,7 +31,8 @@ impl RegisterModel {
         (first..=last).map(shown).collect()
     }
 
-    /// Compares the model with the registers of the arm.
+    /// Compares the model with the registers of the arm. Also checks that registers 83 to 89 repeat 54 to 60, and that the loads
+    /// in 91 to 97 are in range (M3).
     pub(crate) fn compare(&self, registers: &RegisterFile) -> Check {
         for (first, last) in MODELLED {
             let ours = self.shown(*first, *last);
@@ -53,7 +54,7 @@ impl RegisterModel {
         self.compare(registers).is_ok() && self.clone().compare_targets(registers).is_ok()
     }
 
-    /// Compares the fine targets that the arm has just shown with the model (D21).
+    /// Compares the fine targets that the arm computed for the present reply with the model (D21).
     pub(crate) fn compare_fine_targets(&self, registers: &RegisterFile) -> Check {
         Joint::ALL.into_iter().try_for_each(|joint| {
             let shown = extended_model::word_of(registers, extended_model::fine_target(joint));
@@ -70,7 +71,7 @@ impl RegisterModel {
     }
 
     /// Checks that a target that differs from the model is the measured position (D12, D13), the goal that a servo held when
-    /// the controller started (D12), or one that the arm may have set (D27, D28). The model takes it over.
+    /// the controller started (D12), or one that the arm may have set (D27, D28). The model then takes over the arm's target.
     pub(crate) fn compare_targets(&mut self, registers: &RegisterFile) -> Check {
         for joint in Joint::ALL {
             let (at, found) = (TARGET_POSITION.of(joint), registers.get(TARGET_POSITION.of(joint)));

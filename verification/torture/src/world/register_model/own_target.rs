@@ -14,7 +14,7 @@ pub(crate) enum OwnTarget {
 }
 
 impl OwnTarget {
-    /// True if the arm may ignore points of a stream, because the joint is let go: a joint that gives way may be, too.
+    /// True if the arm may ignore points of a stream, because the joint may be let go. A joint that gives way may also be let go.
     pub(crate) const fn is_without_streams(self) -> bool {
         !matches!(self, Self::Measured)
     }

@@ -28,7 +28,8 @@ impl RegisterModel {
         self.has_host_target[joint] = false;
     }
 
-    /// On entry into the servo state, measured positions become the targets (D13).
+    /// After a change to or from motor state servo, no target of the host is in force. On entry into servo, measured positions
+    /// become the targets (D13).
     pub(super) fn state_changed(&mut self, was_servo: bool) {
         if self.is_servo() != was_servo {
             self.has_host_target = PerJoint::all(false);
@@ -51,7 +52,7 @@ impl RegisterModel {
         self.set(super::protection_model::SUPPLY_LOST, 1);
     }
 
-    /// The target with its fraction, if the host set it and it is in force.
+    /// The target of the host with its fraction, if it is in force.
     pub(crate) fn host_target(&self, joint: Joint) -> Option<MicroDegrees> {
         self.targets[joint].filter(|_| self.has_host_target[joint])
     }

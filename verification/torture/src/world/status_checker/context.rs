@@ -10,7 +10,7 @@ use crate::world::watchdog_model::WatchdogModel;
 
 /// A joint may be late for this long after it got no goal, for example because its servo left reads unanswered.
 const PAUSE: Duration = Duration::from_millis(1_000);
-/// A joint that is driven gets a goal in each control cycle, or after each timeout on a bus with long ones.
+/// A joint that is driven gets a goal in each control cycle, or after each timeout on a bus with long timeouts.
 const GOAL_PERIOD: Duration = Duration::from_millis(100);
 
 /// The true state of the arm, and its registers.

@@ -15,9 +15,9 @@ use crate::world::extended_model;
 use crate::world::joint_truth::COOL;
 use crate::world::protection_model::PROTECTION;
 
-/// The joint may have moved away and back if its position was not checked for longer than this: two check periods.
+/// A joint may have moved away and back if its position was not checked for longer than this: two check periods.
 const UNCHECKED_TIME: Duration = Duration::from_millis(500);
-/// Torque is off this long after a change to another motor state than servo.
+/// Torque is off at the latest this long after the motor state changed from servo to another.
 const RELEASE_TIME: Duration = Duration::from_millis(300);
 /// The time of a move over the whole range at the lowest speed, 1.9 degrees/s.
 const LONGEST_MOVE: Duration = Duration::from_millis(125_000);
@@ -59,7 +59,7 @@ impl StatusChecker {
         })
     }
 
-    /// Checks the positions of the extended block, which the arm has just shown (D21).
+    /// Checks the positions of the extended block, which the arm computed for the present reply (D21).
     pub(crate) fn check_fine_positions(&self, context: &StatusContext<'_>) -> Check {
         extended_model::check_positions(context.registers)?;
         for joint in Joint::ALL.into_iter().filter(|joint| self.is_responding(*joint, context)) {
@@ -89,7 +89,7 @@ impl StatusChecker {
         if may_have_moved {
             self.last_moves[joint] = (position, context.now);
         }
-        // It may also move after a write.
+        // The joint may also move after a write.
         if may_have_moved || self.settled_time(context.now, since.max(self.motion_at)) < DETECTION_TIME {
             return Ok(());
         }

@@ -8,9 +8,9 @@ use protocol_core::time::{Duration, Instant};
 use crate::world::extended_model;
 use crate::world::register_model::RegisterModel;
 
-/// The time that a move may take beyond its distance at its speed.
+/// How much longer a move may take than its distance divided by its speed.
 const MOVE_MARGIN: Duration = Duration::from_millis(1_000);
-/// A point of a stream is reached after two periods and a cycle (D23), of the longest period.
+/// The longest time until a point of a stream is reached: two of the longest periods and a control cycle (D23).
 const MAX_STREAM_TIME: Duration = Duration::from_millis(2_020);
 /// More than any move of a set-point, in counts: from one end of a servo's range of 1,023 counts to a target beyond its other
 /// end. The range of joint 7 ends at 68 degrees with the offset -16, and its targets go up to 180 degrees.
