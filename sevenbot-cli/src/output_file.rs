@@ -4,7 +4,7 @@
 //! result is there.
 
 use std::fs::{self, File};
-use std::io::{self, Write};
+use std::io::{self, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
 use crate::command_error::CommandError;
@@ -51,6 +51,18 @@ impl OutputFile {
         }
         self.file.write_all(content)
     }
+}
+
+/// Writes the content of a file to standard output, unchanged: the printer would remove escape sequences from it. The name of
+/// a `binary` format, which a terminal cannot show, is for the error.
+pub(crate) fn write_to_stdout(content: &[u8], binary: Option<&str>) -> Result<(), CommandError> {
+    let mut stdout = io::stdout();
+    if let Some(name) = binary.filter(|_| stdout.is_terminal()) {
+        let advice = format!("a terminal cannot show {name}: write it to a file, or redirect the output");
+        return Err(CommandError::Usage(advice));
+    }
+    stdout.write_all(content)?;
+    Ok(stdout.flush()?)
 }
 
 impl Drop for OutputFile {

@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use crate::command_error::CommandError;
 use crate::input_file;
-use crate::output_file::{ForceArg, OutputFile};
+use crate::output_file::{ForceArg, OutputFile, write_to_stdout};
 use crate::printer::Printable;
 use crate::session::Session;
 
@@ -89,7 +89,7 @@ pub(crate) fn run(session: &mut Session, args: &ConvertArgs) -> Result<(), Comma
         Err(error) => return Err(CommandError::file(&args.input, error)),
     };
     match file {
-        None => session.printer.print_raw(&bytes)?,
+        None => write_to_stdout(&bytes, (format == Format::Mcap).then_some("mcap"))?,
         Some(file) => {
             file.write(&bytes)?;
             let moments = recording.moments().count();

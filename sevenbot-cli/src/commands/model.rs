@@ -1,12 +1,12 @@
 //! `model`: the arm's model for robotics programs, to standard output or a file.
 
-use std::io::{self, IsTerminal, Write};
+use std::io;
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
 use crate::command_error::CommandError;
-use crate::output_file::{ForceArg, OutputFile};
+use crate::output_file::{ForceArg, OutputFile, write_to_stdout};
 
 /// Write the arm's model: URDF, MJCF or glTF.
 #[derive(Debug, Args)]
@@ -61,12 +61,5 @@ pub(crate) fn run(args: &ModelArgs) -> Result<(), CommandError> {
     if let Some(path) = &args.out {
         return OutputFile::open(path, None, args.force)?.write(&bytes);
     }
-    let mut stdout = io::stdout();
-    if args.format == ModelFormat::Glb && stdout.is_terminal() {
-        let advice = "a terminal cannot show glb: add --out FILE, or redirect the output";
-        return Err(CommandError::Usage(advice.to_owned()));
-    }
-    // Do not use the printer: it removes escape sequences, and glb is binary.
-    stdout.write_all(&bytes)?;
-    Ok(stdout.flush()?)
+    write_to_stdout(&bytes, (args.format == ModelFormat::Glb).then_some("glb"))
 }

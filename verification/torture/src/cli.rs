@@ -71,7 +71,7 @@ pub enum TortureCommand {
 
 fn positive(text: &str) -> Result<f64, &'static str> {
     let number: Option<f64> = text.parse().ok();
-    number.filter(|number| *number > 0.0 && *number < 1e6).ok_or("use a number above 0")
+    number.filter(|number| *number > 0.0 && *number < 1e6).ok_or("use a number above 0 and below 1,000,000")
 }
 
 fn scenario(name: &str) -> Result<&'static Scenario, String> {

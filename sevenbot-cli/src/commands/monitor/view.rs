@@ -28,12 +28,17 @@ const MEAN_WEIGHT: f64 = 0.1;
 #[expect(clippy::large_enum_variant, reason = "nearly every event is a sample")]
 pub(crate) enum ArmEvent {
     /// Connected: port and firmware version.
-    Found { port: String, firmware: String },
+    Found {
+        port: String,
+        firmware: String,
+    },
     /// Not connected, for this reason.
     Lost(String),
     Sample(ArmSample),
     /// A question without an answer, and the number of damaged frames received.
-    Unanswered { damaged: usize },
+    Unanswered {
+        damaged: usize,
+    },
     /// A command failed, for this reason.
     Refused(String),
     /// A command was executed, and the user should know this.

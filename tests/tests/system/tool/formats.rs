@@ -64,6 +64,10 @@ fn a_program_reads_a_recording_while_it_is_written() {
         let again = folder.path().join("live.csv");
         succeeded(run_without_arm(&["convert", text(&live), text(&again)]));
         assert!(fs::read_to_string(&again).expect("CSV").lines().count() > 10);
+        let whole = folder.path().join("whole.mcap");
+        succeeded(run_without_arm(&["convert", text(&live), text(&whole)]));
+        let piped = run_without_arm(&["convert", text(&live), "-", "--to", "mcap"]);
+        assert_eq!(piped.stdout, fs::read(&whole).expect("MCAP"), "the same bytes through a pipe");
     });
 }
 
