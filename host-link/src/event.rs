@@ -27,7 +27,8 @@ pub enum HostEvent {
     Send(Vec<u8>),
     /// The reply to a read: the registers that were wanted.
     Reply(RequestId, Snapshot),
-    /// No reply comes to the read of these registers: it was lost or damaged, or the arm does not answer.
+    /// The read of these registers ends without a reply: the reply was lost or damaged, the arm does not answer, or the line was
+    /// reset.
     NoReply(RequestId, Span),
     /// A report of the arm ([D14](protocol_core::decisions#d14), [M4](protocol_core::decisions#m4)). The map tells its form.
     Report(Map, Snapshot),

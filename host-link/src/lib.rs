@@ -9,10 +9,10 @@
 //!   bytes ──▶ Deframer ┴──────────────────────────────────▶ Report, Alarm, Unmatched, Damaged
 //! ```
 //!
-//! It reads no clock and opens no port: time and bytes are arguments. The blocking library, the hub of `sevenbot serve`
-//! and the page in a browser are shells round it. It does not know what the registers of the arm mean, except for two
-//! things that all shells share: the registers of a server ([`sharing`]), and the limits that a stop has to keep
-//! ([`keep_limits`]).
+//! The crate reads no clock and opens no port: time and bytes are arguments. The blocking library, the hub of
+//! `sevenbot serve` and the page in a browser are shells round it. It does not know what the registers of the arm mean,
+//! except for two things that all shells share: the registers of a server ([`sharing`]), and the limits that a stop has to
+//! keep ([`keep_limits`]).
 //!
 //! ```
 //! use host_link::{HostEvent, HostLink, LinkOptions, Patience, Span};

@@ -1,8 +1,8 @@
 //! The targets that hold an arm, within its limits ([D25](protocol_core::decisions#d25)).
 //!
-//! An arm refuses a whole frame of targets if one is against a limit, even if a joint was measured there: a moving
-//! joint is some degrees off its set-point. If a stop wrote such measured positions, the arm would refuse it and stop
-//! no joint.
+//! An arm refuses a whole frame of targets if one is against a limit. A measured position may be against a limit, because
+//! a moving joint is some degrees off its set-point. If a stop wrote such positions as targets, the arm would refuse the
+//! frame and stop no joint.
 
 use protocol_core::registers::JOINTS;
 use protocol_core::registers::map::limit;
@@ -13,8 +13,9 @@ const DEGREE: u16 = 100;
 /// Brings the targets that hold an arm within its limits. All are in hundredths of a degree: `present` holds the
 /// targets of the arm, and `written` the targets that are to be written. `limits` is register 188.
 ///
-/// The joint that was on its way inwards goes on until the linkage allows the pair. Targets that would not change are
-/// not written: the arm was outside before, and holds there.
+/// If the targets of joints 2 and 3 break the limit of the linkage, the joint that moves inwards gets a target further
+/// inwards, at the limit. Targets against a limit that equal those of the arm become `None`: the arm was outside before,
+/// and holds there.
 pub fn keep_limits(limits: u8, present: &[u16; JOINTS], written: &mut [Option<u16>; JOINTS]) {
     let [_, two, three, .., seven] = written;
     let &[_, two_now, three_now, .., seven_now] = present;
@@ -44,7 +45,8 @@ fn keep_linkage(present: [u16; 2], written: [&mut Option<u16>; 2]) {
     *target = target.and_then(|target| u16::try_from(i32::from(target) - excess).ok());
 }
 
-/// By how much the sum of the angles of joints 2 and 3 is too large, or too small where it is negative.
+/// How far the sum of the angles of joints 2 and 3 is outside its limits, in hundredths of a degree: positive above the
+/// largest sum, negative below the smallest, otherwise 0.
 fn linkage_excess([two, three]: [u16; 2]) -> i32 {
     let (min, max) = limit::LINKAGE_SUM;
     let [min, max] = [min, max].map(|degrees| i32::from(DEGREE) * i32::from(degrees));
@@ -59,7 +61,7 @@ mod tests {
     const LINKAGE: u8 = limit::LINKAGE;
     const CLAW: u8 = limit::CLAW;
 
-    /// The targets of joints 2, 3 and 7, from those of the arm and those to be written.
+    /// The targets of joints 2, 3 and 7 after [`keep_limits`]: `present` are the arm's, `written` those to be written.
     fn kept(limits: u8, present: [u16; 3], written: [Option<u16>; 3]) -> [Option<u16>; 3] {
         let [two, three, seven] = written;
         let mut targets = [Some(1), two, three, None, None, None, seven];

@@ -2,11 +2,11 @@
 
 use protocol_core::time::{Duration, Instant};
 
-/// Before the first reply, a reply may be this much later than the time on the line explains. A USB adapter holds bytes
-/// back for up to 16 ms in each direction (the latency timer of FTDI chips). An arm answers within a control cycle of
-/// 10 ms. The rest is for a busy host, or a server with other clients.
+/// The allowance until the first reply has come: a reply may be this much later than the time on the line explains. A USB
+/// adapter holds bytes back for up to 16 ms in each direction (the latency timer of FTDI chips). An arm answers within a
+/// control cycle of 10 ms. The rest is for a busy host, or a server with other clients.
 pub const ROUND_TRIP: Duration = Duration::from_millis(100);
-/// The shortest allowance: a reply may be this much later than due even if all others came in time.
+/// The shortest allowance, for a line on which all replies came in time.
 const SHORTEST: Duration = Duration::from_millis(4);
 /// Microseconds of ten bits, a byte with start and stop bit, at 1 bit/s.
 const BYTE: u64 = 10_000_000;
@@ -34,7 +34,7 @@ impl LineTime {
         Self { baud, busy_until: Instant::ZERO, allowance: ROUND_TRIP }
     }
 
-    /// Notes that these bytes are sent at `now`, behind those before.
+    /// Notes that these bytes are sent at `now`, after all earlier bytes.
     pub(crate) fn send(&mut self, now: Instant, bytes: usize) {
         self.busy_until = self.busy_until.max(now) + time_on_line(self.baud, bytes);
     }
@@ -44,13 +44,13 @@ impl LineTime {
         self.busy_until
     }
 
-    /// How much later than due replies may be: twice as much as they were lately. So a lost reply costs little on a line
-    /// where replies come in time, and a slow server is not asked more often the slower it gets.
+    /// How much later than due a reply may be: twice the recent delay. So a lost reply costs little on a line where replies
+    /// come in time, and a server that becomes slower does not get more repeated reads.
     pub(crate) const fn allowance(&self) -> Duration {
         self.allowance
     }
 
-    /// A reply that was due at `due` came at `now`. A longer delay counts at once, and is forgotten over some ten
+    /// Notes that a reply came at `now`, and was due at `due`. A longer delay counts at once, and is forgotten over some ten
     /// replies.
     pub(crate) fn note_reply(&mut self, due: Instant, now: Instant) {
         let forgotten = self.allowance.as_micros() / FORGETTING;

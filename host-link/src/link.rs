@@ -31,7 +31,7 @@ pub struct LinkOptions {
 enum Queued {
     Read(OpenRead),
     Write(Vec<u8>),
-    /// A write that goes before all others.
+    /// A write that is sent before all other requests in the queue.
     WriteAhead(Vec<u8>),
 }
 
@@ -46,7 +46,7 @@ pub struct HostLink {
     pending: PendingReads,
     events: VecDeque<HostEvent>,
     last_id: RequestId,
-    /// Writes that were sent.
+    /// The number of writes that were sent; wraps.
     writes: u64,
     /// All bytes that came until this time were handed over.
     heard_until: Instant,
@@ -83,7 +83,8 @@ impl HostLink {
     }
 
     /// Writes registers, at most 255, by the function of a map ([M1](protocol_core::decisions#m1)). A write has no reply
-    /// ([D6](protocol_core::decisions#d6)). It is sent behind the reads before it, and none of these is repeated behind it.
+    /// ([D6](protocol_core::decisions#d6)). It is sent after the requests in the queue. Reads that were sent before the write
+    /// are not repeated after it.
     pub fn write(&mut self, map: Map, address: u8, values: &[u8]) {
         self.queue.push_back(Queued::Write(encoded_write(map, address, values)));
     }
@@ -94,14 +95,15 @@ impl HostLink {
         self.queue.insert(place, Queued::WriteAhead(encoded_write(map, address, values)));
     }
 
-    /// Gives a read up. Its reply may still come, and is [`HostEvent::Unmatched`] then.
+    /// Gives a read up. If its reply still comes, it is [`HostEvent::Unmatched`].
     pub fn cancel(&mut self, id: RequestId) {
         self.queue.retain(|queued| !matches!(queued, Queued::Read(read) if read.id == id));
         self.open.take(id);
         self.pending.give_up(id);
     }
 
-    /// The line was opened or closed: all reads end without a reply, and all bytes are forgotten.
+    /// For a line that was opened or closed: ends all reads without a reply, and drops writes in the queue, events and received
+    /// bytes.
     pub fn reset(&mut self) {
         let queued = std::mem::take(&mut self.queue).into_iter().filter_map(|queued| match queued {
             Queued::Read(read) => Some(read),
@@ -112,8 +114,9 @@ impl HostLink {
         *self = Self { line, last_id, events, ..Self::new(self.options) };
     }
 
-    /// Takes bytes of the arm that were there at `now`. An empty slice states that the line is silent at `now`. Timeouts act
-    /// only when this was called at their time or later: a host that was suspended takes first what came meanwhile.
+    /// Takes bytes of the arm that have arrived until `now`. An empty slice states that no others have arrived. A timeout acts
+    /// only after a call with its time or a later one, so that a host that was suspended first passes on the bytes that
+    /// arrived meanwhile.
     pub fn bytes(&mut self, now: Instant, bytes: &[u8]) {
         self.heard_until = self.heard_until.max(now);
         let mut rest = bytes;
@@ -188,7 +191,7 @@ impl HostLink {
 
     fn end_attempt(&mut self, overdue: Overdue) {
         match overdue {
-            // Before the writes that wait.
+            // A repeat goes to the front, because it must not be sent after writes that wait.
             Overdue::Repeat(read) => self.queue.push_front(Queued::Read(read)),
             Overdue::GiveUp(read) => {
                 self.pending.give_up(read.id);

@@ -10,11 +10,11 @@ use crate::span::Span;
 
 /// How long to wait for the reply to a read, and whether to repeat the read meanwhile.
 ///
-/// A read is repeated as soon as its reply is later than replies were lately ([`ROUND_TRIP`] before there were any).
-/// The time to the next repeat doubles, up to [`ROUND_TRIP`] or what was learned, whichever is longer. A read changes
-/// nothing, so a needless one does no harm. It is given up after `timeout` for each attempt, counted from the time when
-/// its reply was due. So a lost reply costs little time, several lost replies are no error, and a slow arm gets the
-/// whole time.
+/// A read is repeated as soon as its reply is later than an allowance: twice the recent delay of replies, and
+/// [`ROUND_TRIP`] before the first reply. The time to the next repeat doubles, up to [`ROUND_TRIP`] or the allowance,
+/// whichever is longer. A read changes nothing, so a needless repeat does no harm. The read is given up `attempts` times
+/// `timeout` after the reply to its first attempt was due. So a lost reply costs little time, several lost replies are no
+/// error, and a slow arm gets the whole time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Patience {
     /// The wait for the reply lasts this many times `timeout`, at least once. A read with one attempt is not repeated.
@@ -48,9 +48,9 @@ pub(crate) struct OpenRead {
     pub(crate) id: RequestId,
     pub(crate) wanted: Span,
     pub(crate) patience: Patience,
-    /// How often it was sent and nothing came.
+    /// How many times it was sent, except for attempts whose reply came damaged.
     sent: u32,
-    /// How many writes were sent before it.
+    /// How many writes were sent before its last attempt.
     writes_before: u64,
     /// When it is repeated or given up.
     due: Instant,
@@ -62,8 +62,8 @@ impl OpenRead {
         Self { id, wanted, patience, sent: 0, writes_before: 0, due: Instant::FAR_FUTURE, give_up_at: None }
     }
 
-    /// The read is sent; `writes` counts the writes sent before it. Its reply is due at `reply_due`, and may be later by the
-    /// allowance.
+    /// Notes that the read is sent; `writes` counts the writes sent before it. Its reply is due at `reply_due`, and may be later
+    /// by the allowance.
     pub(crate) fn note_sent(&mut self, reply_due: Instant, allowance: Duration, writes: u64) {
         self.sent = self.sent.saturating_add(1);
         self.writes_before = writes;
@@ -72,12 +72,13 @@ impl OpenRead {
         self.due = if self.patience.repeats() { repeat_at.min(give_up_at) } else { give_up_at };
     }
 
-    /// May it be sent again? Not if writes were sent since: it would read what they changed. `writes` counts all writes so far.
+    /// May it be sent again? Not if a write was sent since: the repeat would read what the write changed. `writes` counts all
+    /// writes so far.
     pub(crate) const fn may_repeat(&self, writes: u64) -> bool {
         self.patience.repeats() && self.writes_before == writes
     }
 
-    /// The read is not repeated any more: wait until it is given up.
+    /// Waits until the read is given up, because it is not repeated any more.
     fn wait_to_the_end(&mut self) {
         self.due = self.give_up_at.unwrap_or(self.due);
     }
@@ -90,7 +91,7 @@ pub(crate) enum Overdue {
     GiveUp(OpenRead),
 }
 
-/// The reads that still want a reply, in the order in which they were sent first.
+/// The reads that were sent and still want a reply, in the order in which each was sent last.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct OpenReads(VecDeque<OpenRead>);
 
@@ -108,8 +109,8 @@ impl OpenReads {
         self.0.drain(..)
     }
 
-    /// The reply to this read came at `now` and was damaged, so nothing more is waited for. It does not count as an attempt:
-    /// the arm answers in time.
+    /// The reply to this read came damaged at `now`: the read is repeated at once. The attempt does not lengthen the time to
+    /// the next repeat, because the arm answers in time.
     pub(crate) fn note_damage(&mut self, id: RequestId, now: Instant) {
         let damaged = self.0.iter_mut().find(|read| read.id == id && read.patience.repeats());
         if let Some(read) = damaged {

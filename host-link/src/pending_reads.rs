@@ -38,19 +38,18 @@ pub(crate) struct PendingReads(VecDeque<SentRead>);
 /// The read that a reply answers.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Matched {
-    /// The read that it answers; `None` if that was given up.
+    /// The read that the reply answers; `None` if the read was given up.
     pub(crate) id: Option<RequestId>,
     /// When the reply was due.
     pub(crate) due: Instant,
-    /// Reads that were sent before that one, oldest first: their replies are lost.
+    /// Reads that were sent before the answered one, oldest first: their replies are lost.
     pub(crate) lost: Vec<RequestId>,
 }
 
 impl PendingReads {
-    /// The range to ask for: one that holds `wanted`, and that neither a pending read nor one of `reports` has. If no
-    /// such range is left, it is `wanted` itself, which an earlier attempt of the same read has, or a read that was
-    /// given up: the first reply then counts for the earlier one. `None` while another open read has asked for
-    /// `wanted`.
+    /// The range to ask for: the shortest one that holds `wanted`, and that neither a pending read nor one of `reports` has.
+    /// If no such range is left, it is `wanted` itself. A pending read with this range is then an earlier attempt or was
+    /// given up, and the first reply counts for it. `None` while another open read has asked for `wanted`.
     pub(crate) fn range_for(&self, id: RequestId, wanted: Span, reports: &[Span]) -> Option<Span> {
         let is_free = |span: &Span| !reports.contains(span) && !self.has(span, |_| true);
         let wider = (0..=u8::MAX).map_while(|by| wanted.widened(by)).find(is_free);
@@ -58,12 +57,12 @@ impl PendingReads {
         wider.or_else(|| (!self.has(&wanted, is_of_another)).then_some(wanted))
     }
 
-    /// A read was sent. Its reply is due at this time.
+    /// Adds a read that was sent. Its reply is due at `due`.
     pub(crate) fn add(&mut self, id: RequestId, asked: Span, due: Instant) {
         self.0.push_back(SentRead { id: Some(id), asked, due, is_damaged: false });
     }
 
-    /// The read is given up, or answered.
+    /// Marks a read as given up or answered. Forgets the oldest such reads if there are more than [`REMEMBERED`].
     pub(crate) fn give_up(&mut self, id: RequestId) {
         for read in self.0.iter_mut().filter(|read| read.id == Some(id)) {
             read.id = None;

@@ -13,12 +13,12 @@ pub const FIRST: u8 = 232;
 const COMMAND: u8 = 239;
 /// The value of register 232: the version of the layout of this block.
 const VERSION: u8 = 1;
-/// The largest distance that its weight draws a joint off a target that it has reached, in hundredths of a degree. A
-/// stop may leave the target of such a joint unchanged ([D24](protocol_core::decisions#d24)). A joint that is farther
-/// off is at an obstacle.
+/// The largest distance by which a joint droops under its weight from a target that it has reached, in hundredths of a
+/// degree. A stop may leave the target of such a joint unchanged ([D24](protocol_core::decisions#d24)). A joint that is
+/// farther off is at an obstacle.
 pub const DROOP: u16 = 150;
 
-/// Are all these registers the server's?
+/// Are all these registers the server's? `false` for a count of 0.
 #[must_use]
 pub const fn is_own(address: u8, count: u8) -> bool {
     FIRST <= address && address <= COMMAND && 0 < count && count <= COMMAND - address + 1
@@ -49,9 +49,9 @@ impl DrivenBy {
 pub enum Command {
     /// The arm holds where it is.
     Stop = 1,
-    /// The program starts anew after a stop.
+    /// The program starts anew after another program's stop: the server passes this program's targets on again.
     StartAnew = 2,
-    /// The program hands the arm over.
+    /// The program hands the arm over: another program may drive at once.
     HandOver = 3,
 }
 
@@ -70,7 +70,7 @@ impl Command {
     }
 }
 
-/// What a program reads.
+/// The state of a server, as a program reads it in registers 232 to 238.
 ///
 /// ```
 /// use host_link::Snapshot;
@@ -86,17 +86,18 @@ impl Command {
 pub struct SharingState {
     /// Programs that are connected to the server.
     pub clients: u8,
-    /// Who drives.
+    /// Who wrote targets within the last second.
     pub driven_by: DrivenBy,
     /// Stops of all programs so far, wrapping.
     pub stops: u8,
-    /// A stop of another program ended what this one streams: its targets are dropped until it starts anew.
+    /// Did another program's stop end the stream of this program? Then the server drops this program's targets until this
+    /// program starts anew.
     pub is_stopped: bool,
-    /// Writes do not reach the arm.
+    /// Does the server pass no writes on?
     pub is_read_only: bool,
-    /// Only one program drives at a time.
+    /// Does the server let only one program at a time drive the arm?
     pub has_one_driver: bool,
-    /// No arm answers.
+    /// Does no arm answer the server?
     pub is_without_arm: bool,
     /// Writes of this program that were not carried out, wrapping.
     pub dropped: u16,

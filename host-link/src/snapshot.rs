@@ -5,7 +5,7 @@ use protocol_core::registers::{Joint, Register};
 
 use crate::span::Span;
 
-/// The layout of each block that is known.
+/// The only known layout version of the three blocks.
 const KNOWN_LAYOUT: u8 = 1;
 
 /// The values of consecutive registers at one instant.

@@ -27,7 +27,7 @@ impl Span {
     /// `count` registers from `address` on; `None` if they reach past 255.
     #[must_use]
     pub const fn new(address: u8, count: u8) -> Option<Self> {
-        // Lossless.
+        // The casts are lossless; `From` is not const.
         if address as usize + count as usize <= ADDRESSES { Some(Self { address, count }) } else { None }
     }
 
@@ -52,13 +52,13 @@ impl Span {
         Self { address: row.address, count: row.count }
     }
 
-    /// All registers from one row of the table to a later one.
+    /// All registers from the first of one row of the table to the last of a later row.
     #[must_use]
     pub const fn between(first: &Register, last: &Register) -> Self {
         Self::of(first).through(last)
     }
 
-    /// All registers from the first of this span to a later row of the table.
+    /// All registers from the first of this span to the last of a later row of the table.
     #[must_use]
     pub const fn through(self, last: &Register) -> Self {
         let distance = last.address.saturating_sub(self.address);
@@ -82,7 +82,7 @@ impl Span {
         (self.address..=u8::MAX).take(usize::from(self.count))
     }
 
-    /// This span with `by` registers more: after it, or before it at the end of the map.
+    /// This span with `by` registers more: after it, or before it at the end of the map. `None` if neither is possible.
     pub(crate) fn widened(self, by: u8) -> Option<Self> {
         let count = self.count.checked_add(by)?;
         Self::new(self.address, count).or_else(|| Self::new(self.address.checked_sub(by)?, count))

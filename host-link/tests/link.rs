@@ -1,4 +1,4 @@
-//! A link on a line on which replies are lost, damaged or late, in virtual time.
+//! A link in virtual time: lost, damaged and late replies, reports, the order of requests, and a reset.
 
 #![allow(clippy::expect_used, clippy::indexing_slicing, clippy::panic)] // A panic is a failed test.
 
@@ -29,7 +29,7 @@ fn reply(address: u8, values: &[u8]) -> Vec<u8> {
     frame.to_vec()
 }
 
-/// The events until the link waits, and until when.
+/// The events until the link waits, and the time until which it waits.
 fn events(link: &mut HostLink, now: Instant) -> (Vec<HostEvent>, Instant) {
     let mut events = Vec::new();
     loop {
@@ -48,7 +48,7 @@ fn sent(link: &mut HostLink, now: Instant) -> (u8, u8) {
     }
 }
 
-/// Lets the line be silent until the link does something.
+/// Lets the line be silent until the link's deadline. Returns the events at that time, and the time.
 fn next_after_silence(link: &mut HostLink, now: Instant) -> (Vec<HostEvent>, Instant) {
     let (events_now, until) = events(link, now);
     assert_eq!(events_now, []);
@@ -156,7 +156,7 @@ fn a_silent_arm_gets_all_the_time() {
     assert!((1_500..1_510).contains(&end), "{end}");
     let gaps: Vec<u64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
     assert!((100..110).contains(&times[0]), "{times:?}");
-    // The line carries the replies to all attempts.
+    // The gaps grow, because a reply is due only after the replies to all earlier attempts.
     assert!(gaps.iter().all(|gap| (100..120).contains(gap)), "{gaps:?}");
 }
 

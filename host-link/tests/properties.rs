@@ -229,7 +229,7 @@ fn streams() -> impl Strategy<Value = Vec<u8>> {
 proptest! {
     #[test]
     fn no_fault_makes_a_reply_that_of_another_request(
-        // At most 64 frames of reads: as many as are remembered.
+        // The schedules are short, because a link remembers at most 64 reads that were given up.
         actions in vec(actions(), 0..32),
         fates in vec(fates(), 0..60),
     ) {

@@ -11,7 +11,7 @@ use crate::limits::joint_angle;
 use crate::vector::Vector;
 
 /// All angles of joints 1 to 3, in degrees, that bring the wrist to a point in millimetres. The first solution is the one
-/// of [`ik5`]. The second has joint 1 at the opposite end.
+/// of [`ik5`]. The second has joint 1 at the opposite end; `None` if there is none.
 ///
 /// # Errors
 ///
@@ -23,7 +23,7 @@ pub fn ik5_all<F: Float>(wrist: Vector<F>) -> Result<[Option<[F; 3]>; 2], NoSolu
 
 /// All angles of joints 1 to 5, in degrees, that bring the tip to a point in millimetres and point the tool in a
 /// direction of any length. The first solution is the one of [`ik6`]. The second has joint 4 at the opposite end. The
-/// other two have joint 1 at the opposite end.
+/// other two have joint 1 at the opposite end. A solution that does not exist is `None`.
 ///
 /// Where the tool is in line with the forearm, joint 4 may have any angle. It gets 90 degrees.
 ///

@@ -42,7 +42,7 @@ pub trait Float:
         if self > other { self } else { other }
     }
 
-    /// Sine and cosine of an angle in degrees, -180 to 180 and 45 more to either side. Others are less exact.
+    /// Sine and cosine of an angle in degrees. Outside -225 to 225 degrees the result is less exact.
     #[must_use]
     fn sin_cos(self) -> (Self, Self) {
         let degrees = self.abs();
@@ -72,7 +72,7 @@ fn sin_cos_to_45<F: Float>(degrees: F) -> (F, F) {
     let one = F::of(1.0);
     let radians = degrees * F::of(core::f64::consts::PI / 180.0);
     let square = radians * radians;
-    // Each term is the one before times square / (n (n + 1)).
+    // Each term of the series is the previous term times -square / (n (n + 1)).
     let term = |n: f64, rest: F| one - square * F::of(1.0 / (n * (n + 1.0))) * rest;
     let cosine =
         term(1.0, term(3.0, term(5.0, term(7.0, term(9.0, term(11.0, term(13.0, term(15.0, one))))))));

@@ -1,4 +1,5 @@
-//! Dimensions and limits of the arm, from the maker's published firmware and its page that draws the arm.
+//! Dimensions and limits of the arm, from the maker's published firmware and the maker's page that draws the arm. Estimates
+//! are marked.
 //!
 //! ```text
 //!                  normal n
@@ -13,8 +14,9 @@
 //!    └──── base axis    └── heading
 //! ```
 //!
-//! A parallelogram keeps the forearm's angle to the horizontal when joint 2 moves. Its link is drawn by the maker from
-//! the lever, on the shoulder axis, to the forearm behind the elbow. It limits the angle between rear arm and forearm.
+//! A parallelogram keeps the forearm's angle to the horizontal when joint 2 moves. The maker draws its link from the
+//! lever, on the shoulder axis, to the forearm behind the elbow. The parallelogram limits the angle between rear arm and
+//! forearm.
 //!
 //! Lengths are millimetres, angles degrees as the registers have them.
 
@@ -30,26 +32,26 @@ pub const ELBOW_OFFSET: f64 = 25.0;
 pub const FOREARM: f64 = 198.5;
 /// From the wrist to the outer face of the disc that joint 6 turns.
 pub const TOOL: f64 = 22.46;
-/// Radius of that disc.
+/// Radius of the disc that joint 6 turns.
 pub const DISC_RADIUS: f64 = 20.0;
-/// From the shoulder axis to the end of the parallelogram's lever. It moves no other point.
+/// From the shoulder axis to the end of the parallelogram's lever. The lever moves no other point.
 pub const LEVER: f64 = 40.0;
 /// From the top plate down to the foot of the base; an estimate. The foot stands on the table.
 pub const BASE_HEIGHT: f64 = 60.0;
 /// Radius of the foot, the widest part of the base; an estimate.
 pub const BASE_RADIUS: f64 = 78.0;
 
-/// The axes of the claw's fingers: their distance from the disc along the tool, and from the tool's axis to either side. This and
-/// the next two are estimates.
+/// The axes of the claw's fingers: their distance from the disc along the tool, and from the tool's axis to either side; an
+/// estimate.
 pub const FINGER_AXIS: [f64; 2] = [14.0, 11.0];
-/// The bend of a finger: along the tool and outward from its axis, with the claw closed.
+/// The bend of a finger: along the tool and outward from its axis, with the claw closed; an estimate.
 pub const FINGER_BEND: [f64; 2] = [22.0, 6.0];
-/// The end of a finger, in the same way.
+/// The end of a finger, measured as the bend; an estimate.
 pub const FINGER_END: [f64; 2] = [52.0, -7.0];
 
 /// From the elbow axis to the wrist: the hypotenuse of [`FOREARM`] and [`ELBOW_OFFSET`].
 pub(crate) const ELBOW_TO_WRIST: f64 = 200.068_113_401_411_37;
-/// The angle between that line and the axis of the forearm.
+/// The angle between the line from elbow to wrist and the axis of the forearm, in degrees.
 pub(crate) const ELBOW_TO_WRIST_ANGLE: f64 = 7.178_298_211_576_967;
 
 /// The angle of joint 3 at which the forearm is level. Larger angles lower the wrist.

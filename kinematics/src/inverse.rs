@@ -8,7 +8,7 @@
 //!
 //! A wrist has two headings: towards it, and away from it with the wrist behind the base axis. Joint 1 reaches one of
 //! them, or both where y is 0. The parallelogram allows one of the two bends of the elbow, and joint 4 one of the two
-//! rolls of the hand. So there is one solution but for the cases that [`ik5`] and [`ik6`] name.
+//! rolls of the hand. So there is one solution, except in the cases that [`ik5`] and [`ik6`] name.
 
 use crate::float::Float;
 use crate::forward::{ArmFrames, HandFrames};
@@ -25,9 +25,9 @@ pub(crate) const NO_HEADING: f64 = 0.001;
 /// Why no angles of the joints reach a position.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NoSolution {
-    /// The wrist is too far from the shoulder: the linkage allows 318.47 mm.
+    /// The wrist is too far from the shoulder: the linkage allows at most 318.47 mm.
     TooFar,
-    /// The wrist is too near to the shoulder: the linkage allows 106.47 mm.
+    /// The wrist is too near to the shoulder: the linkage needs at least 106.47 mm.
     TooNear,
     /// The joint of this number, 1 to 3, would have to turn beyond 0 or 180 degrees.
     Joint(u8),
@@ -49,7 +49,7 @@ pub enum NoSolution {
 ///
 /// # Errors
 ///
-/// Why the arm does not reach the point with its heading towards it. The first reason counts: a number that is not
+/// Why the arm does not reach the point when it heads towards the point. The first reason counts: a number that is not
 /// finite, no heading, the distance, joint 2, joint 3, joint 1.
 pub fn ik5<F: Float>(wrist: Vector<F>) -> Result<[F; 3], NoSolution> {
     with_either_heading(wrist, Ok)
@@ -129,7 +129,7 @@ fn with_either_heading<F: Float, T>(
     let away = unwrapped(if towards > F::of(0.0) { towards - half_turn() } else { towards + half_turn() });
     solve(towards, radius).or_else(|why| {
         solve(away, -radius).map_err(|other| match other {
-            // This heading got further.
+            // With this heading only the hand fails, so its reason is the better one.
             NoSolution::ToolDirection => other,
             _ => why,
         })
@@ -172,17 +172,17 @@ pub(crate) fn roll_and_bend<F: Float>(arm: &ArmFrames<F>, tool: Vector<F>) -> Re
     joint_angle(t5).map(|t5| [t4, t5]).ok_or(NoSolution::ToolDirection)
 }
 
-/// A direction with length 1, or `none` if it has none.
+/// The vector scaled to length 1. Fails with `none` if the vector is zero.
 pub(crate) fn direction<F: Float>(vector: Vector<F>, none: NoSolution) -> Result<Vector<F>, NoSolution> {
     if vector.is_finite() { vector.unit().ok_or(none) } else { Err(NoSolution::NotFinite) }
 }
 
-/// An angle that the joint of this number can take.
+/// The angle, if the joint of this number can take it. Removes rounding beyond a limit.
 fn joint<F: Float>(number: u8, degrees: F) -> Result<F, NoSolution> {
     joint_angle(degrees).ok_or(NoSolution::Joint(number))
 }
 
-/// Smaller components of a direction of length 1 are rounding errors.
+/// Components of a direction of length 1 that are smaller than this are rounding errors.
 fn rounding<F: Float>() -> F {
     F::EPSILON * F::of(16.0)
 }

@@ -14,9 +14,9 @@
 //! T1 to T7 are the angles of joints 1 to 7 in degrees, as the registers have them. T7, the claw, moves no point.
 //! Positions are millimetres from where the base axis meets the top plate: x to the right, y forward, z up.
 //!
-//! The functions are generic over `f32` for the chip and `f64` for the host, but for those of [`workspace`], which only
-//! hosts need. They use only exact operations and `libm`,
-//! so all machines get the same bits. The crate uses no heap. It has no unsafe code and no path to a panic.
+//! The functions are generic over `f32` for the chip and `f64` for the host, except those of [`workspace`], which only
+//! hosts need. They use only exactly rounded operations and `libm`, so all machines get the same bits. The crate uses no
+//! heap. It has no unsafe code and no path to a panic.
 //!
 //! ```
 //! use kinematics::{NoSolution, Vector, forward, ik6};

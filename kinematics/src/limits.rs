@@ -5,8 +5,8 @@
 use crate::float::Float;
 use crate::geometry::{CLAW_MAX, JOINT_MAX, LEVEL_FOREARM, LINKAGE_MAX, LINKAGE_MIN};
 
-/// How far an angle may be beyond a limit because of rounding, in degrees. At the arm's full length it moves the tip by
-/// 0.003 mm; one count of a servo is more than 0.2 degrees.
+/// How far an angle may be beyond a limit because of rounding, in degrees. At the arm's full length, a turn by this angle
+/// moves the tip by 0.003 mm; one count of a servo is more than 0.2 degrees.
 pub const TOLERANCE: f64 = 0.0005;
 
 /// A limit that angles break.

@@ -1,4 +1,4 @@
-//! The nearest point within reach, for a point that is not.
+//! The nearest point within reach, for a point out of reach.
 //!
 //! In the plane of the arm, six arcs bound the wrist's reach. Each arc holds one limit:
 //!
@@ -8,8 +8,9 @@
 //!   linkage = 19, linkage = 161 circle round the shoulder
 //! ```
 //!
-//! The nearest point of a plane is the asked one, its projection on an arc, or a corner between two arcs. Joint 1 turns
-//! the plane. The nearest plane is the one through the asked point, or one at an end of joint 1.
+//! Joint 1 turns the plane. The nearest plane is the plane through the requested point, or a plane at an end of joint 1. In a
+//! plane, the nearest point is the projection of the requested point on the plane, its projection on an arc, or a corner
+//! between two arcs.
 
 use core::iter::once;
 
@@ -28,7 +29,7 @@ enum Centre {
     Shoulder,
 }
 
-/// The arcs in order round the reach. Each begins at these angles of joints 2 and 3, where the one before ends.
+/// The arcs in order round the reach. Each begins at these angles of joints 2 and 3, where the previous one ends.
 const ARCS: [(Centre, f64, f64); 6] = [
     (Centre::Elbow, 0.0, 84.0),
     (Centre::ForearmAtShoulder, 0.0, 180.0),
@@ -65,7 +66,8 @@ pub fn nearest_tip<F: Float>(tip: Vector<F>, tool: Vector<F>) -> Option<Vector<F
     ik6(nearest, tool).is_ok().then_some(nearest)
 }
 
-/// What may be nearest to `wrist` with joint 1 at `heading`: its projection on the plane, and points on all arcs.
+/// The candidates for the point nearest to `wrist` with joint 1 at `heading`: the projection of `wrist` on the plane, and
+/// points on all arcs.
 fn in_plane<F: Float>(heading: F, wrist: Vector<F>) -> impl Iterator<Item = Vector<F>> {
     let left = ArmFrames::of([heading; 3]).left;
     let projection = wrist - left * wrist.dot(left);

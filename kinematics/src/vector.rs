@@ -53,7 +53,7 @@ impl<F: Float> Vector<F> {
         if !self.is_finite() || largest <= F::of(0.0) {
             return None;
         }
-        // Scaled first: the square of a short vector may be zero, that of a long one infinite.
+        // Scale first: the square of a short vector may be zero, and the square of a long one infinite.
         let scaled = Self::new(self.x / largest, self.y / largest, self.z / largest);
         Some(scaled * (F::of(1.0) / scaled.length()))
     }

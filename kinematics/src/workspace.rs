@@ -18,13 +18,14 @@ use crate::forward::{ArmFrames, Frames, HandFrames};
 use crate::geometry::{BASE_HEIGHT, BASE_RADIUS, DISC_RADIUS};
 use crate::vector::Vector;
 
-/// The distance that the arm keeps from its base, in mm: half the width of the hand is 13.5 mm, but its parts are round.
+/// The distance that the arm keeps from its base, in mm. It is less than half the width of the hand, 13.5 mm, because the
+/// parts of the hand are round.
 pub const BASE_MARGIN: f64 = 10.0;
 /// The radius of the cylinder that is kept free, in mm.
 pub const KEEP_OUT_RADIUS: f64 = BASE_RADIUS + BASE_MARGIN;
-/// The upper end of that cylinder, in mm.
+/// The upper end of the cylinder that is kept free: z in mm.
 pub const KEEP_OUT_TOP: f64 = BASE_MARGIN;
-/// Steps of the search for the deepest point of a segment. Each leaves two thirds of it: 200 mm / 1.5^30 is 1 um.
+/// Steps of the search for the deepest point of a segment. Each step keeps two thirds of the range: 200 mm / 1.5^30 is 1 um.
 const SEARCH_STEPS: u32 = 30;
 /// Sine and cosine of an eighth of a turn.
 const EIGHTH: f64 = core::f64::consts::FRAC_1_SQRT_2;
@@ -46,7 +47,7 @@ const EDGE: [[f64; 2]; 8] = [
 pub enum Part {
     /// The axis between rear arm and forearm.
     Elbow,
-    /// The line from the elbow to the wrist.
+    /// The axis of the forearm, from its start above the elbow to the wrist.
     Forearm,
     /// The point where the axes of joints 4, 5 and 6 meet.
     Wrist,
@@ -74,8 +75,8 @@ pub struct Clearance {
     pub part: Part,
     /// The obstacle.
     pub obstacle: Obstacle,
-    /// The distance between them in mm; negative inside the obstacle. To the base it is the larger one of the distances
-    /// to its side and to its top.
+    /// The distance between part and obstacle in mm; negative inside the obstacle. The distance from the base is the larger
+    /// one of the distances from its side and from its top.
     pub mm: f64,
 }
 
@@ -148,7 +149,8 @@ fn distance_from_base(point: Vector<f64>) -> f64 {
     (from_axis - KEEP_OUT_RADIUS).max(point.z - KEEP_OUT_TOP)
 }
 
-/// The smallest distance of a line's points. The distance is convex along the line, so a search by thirds finds it.
+/// The smallest distance of the points of a line from the cylinder of the base. The distance is convex along the line, so a
+/// search by thirds finds the smallest one.
 fn segment_from_base(from: Vector<f64>, to: Vector<f64>) -> f64 {
     let at = |share: f64| distance_from_base(from + (to - from) * share);
     let ends = at(0.0).min(at(1.0));

@@ -1,4 +1,4 @@
-//! Advice to the user after a failure, the most likely cause first. May be empty.
+//! Advice to the user after a failure, the most likely cause first. The list is empty if there is no advice.
 
 use crate::error::{Error, OpenError, ReceiveCounts};
 use crate::network::Address;
@@ -77,7 +77,8 @@ fn join(group: Option<&str>) -> String {
     }
 }
 
-/// Advice if damaged frames arrive. The baud rate is right, since frames are recognized.
+/// Advice if frames arrive damaged, or if only other bytes arrive after earlier good frames. The baud rate is right, since
+/// frames are recognized.
 const NOISE: &[&str] = &[
     "frames arrive damaged: is every plug tight, and the ground of the computer and the arm common?",
     "lay the cable away from motors and their supply (interference), or use a shorter one",

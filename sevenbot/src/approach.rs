@@ -6,7 +6,7 @@
 //!   ApproachRule ────────────────┘    or StartTooFar: the distance of each joint
 //! ```
 //!
-//! Arithmetic without an arm or a clock: the command line, Python and the page use the same.
+//! Arithmetic only, without an arm or a clock. The command line, Python and the page share it.
 
 use std::fmt;
 use std::time::Duration;
@@ -22,11 +22,11 @@ use host_link::Snapshot;
 
 /// A first point is refused if a joint is further from it, in degrees.
 pub const NEAR_DEGREES: f64 = 5.0;
-/// Speed of the fastest joint on a way that needs no permission, in degrees/s.
+/// The largest speed of a joint with [`ApproachRule::Near`] and [`ApproachRule::Slowly`], in degrees/s.
 const SLOW_DEGREES_PER_SECOND: f64 = 30.0;
-/// The largest speed of a blend, as a factor of its mean speed.
+/// The peak speed of the blend in [`Approach::at`], divided by its mean speed.
 const PEAK: f64 = 1.5;
-/// Time between two moments of an approach as a recording: the longest step of a playback in whole degrees.
+/// Time between two moments of [`Approach::recording`]. It equals the longest step of a playback in whole degrees.
 const MOMENT: Duration = Duration::from_millis(50);
 
 /// What to do if the first point is not where the arm stands.
@@ -53,7 +53,7 @@ pub struct Standing {
 }
 
 impl Standing {
-    /// From registers 0 to 255. Registers of a block that the firmware lacks are 0.
+    /// From registers 0 to 255, with 0 in the registers of each block that the firmware lacks.
     #[must_use]
     pub fn of(registers: &Snapshot) -> Self {
         let speeds = registers.joints(&SPEED).map(|steps| Speed::from_steps(steps).unwrap_or(Speed::MAXIMUM));
@@ -79,7 +79,7 @@ impl Standing {
 pub struct StartTooFar {
     /// Each joint that is further than 5 degrees from the point, its angle, and the angle of the point, in degrees.
     pub joints: Vec<(Joint, f64, f64)>,
-    /// Is it the way from the end of a recording back to its start, rather than from where the arm stands?
+    /// `true`: the distances are from the end of a recording to its start. `false`: they are from where the arm stands.
     pub is_seam: bool,
 }
 
@@ -192,7 +192,7 @@ pub struct FirstPoints {
 }
 
 impl FirstPoints {
-    /// The angles of the joints that get their first point; `None` if there are none.
+    /// Records the joints of a point. Returns the angles of the joints whose first point this is; `None` if there are none.
     pub fn take(&mut self, point: &FineTargets) -> Option<FineTargets> {
         let mut first = *point;
         for (angle, has_point) in first.iter_mut().zip(&mut self.has_point) {

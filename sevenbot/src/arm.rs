@@ -20,13 +20,13 @@ use crate::network::open_line;
 use crate::reports::{Report, ReportQueue, report_period};
 use host_link::{Snapshot, Span};
 
-/// The status block: the last registers of the table.
+/// The status block, registers 240 to 255.
 pub const STATUS: Span = Span::between(&STATUS_VERSION, &SERVO_TEMPERATURE);
 
-/// At least this many attempts for a read after a write.
+/// The smallest number of attempts for each read in [`Arm::with_min_attempts`].
 const MIN_ATTEMPTS: u32 = 3;
 
-/// A 7Bot V2 at the other end of a serial port.
+/// A 7Bot V2 at the other end of a line: a serial port, a server or a simulation.
 ///
 /// ```no_run
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -84,10 +84,10 @@ impl Arm {
 }
 
 impl Arm {
-    /// An arm at the other end of a line. `name` is what [`Arm::port`] returns.
+    /// Opens the arm at the other end of a line, and checks that a 7Bot V2 answers. [`Arm::port`] returns `name`.
     ///
     /// # Errors
-    /// No device answers, or another device answers.
+    /// No device answers, another device answers, or the port failed.
     pub fn over(line: Box<dyn HostLine>, name: &str, options: ArmOptions) -> Result<Self, OpenError> {
         let nobody = Identity::from(Snapshot { address: 0, values: Vec::new() });
         let path = name.to_owned();
@@ -112,7 +112,8 @@ impl Arm {
         &self.identity
     }
 
-    /// The register map of the arm's frames. All methods take registers of map 2.2 and translate them.
+    /// The register map of the arm's frames. All methods take registers of map 2.2, and registers that only map 2.1 has, and
+    /// translate them.
     #[must_use]
     pub const fn map(&self) -> Map {
         self.view.map
@@ -125,19 +126,19 @@ impl Arm {
         self.view.serves(address)
     }
 
-    /// The time between two reports at a frequency of `hertz`, with this content of [`crate::map::report_content`].
+    /// The time between two reports at a frequency of `hertz`. `content` is a value of [`crate::map::report_content`].
     #[must_use]
     pub fn report_period(&self, hertz: u8, content: u8) -> Duration {
         report_period(self.identity.firmware(), hertz, content, self.options.baud)
     }
 
-    /// The name of the port.
+    /// The name of the port or the address of the server, as given when the arm was opened.
     #[must_use]
     pub fn port(&self) -> &str {
         &self.path
     }
 
-    /// Baud rate, timeout and attempts.
+    /// The options with which the arm was opened.
     #[must_use]
     pub const fn options(&self) -> ArmOptions {
         self.options
@@ -272,7 +273,8 @@ impl Arm {
         Ok(None)
     }
 
-    /// Asks for registers, and does not wait. An earlier question without an answer is given up.
+    /// Asks for registers without waiting for the answer. Drops an earlier background question, and its answer if it was not
+    /// taken.
     ///
     /// # Errors
     /// The port failed.
@@ -300,7 +302,7 @@ impl Arm {
         Ok(read.answer.map(|answer| self.view.view(&answer, read.wanted)))
     }
 
-    /// The error of an arm that answers no background question.
+    /// The error for background questions without an answer. Takes the counts of what was received instead.
     pub(crate) fn no_background_answer(&mut self, span: Span, waited: Duration) -> Error {
         let received = self.link.take_received();
         Error::NoAnswer { span, attempts: 1, waited, received }
@@ -322,7 +324,7 @@ impl Arm {
         }
     }
 
-    /// As [`Self::flush`], and takes the bytes that wait in the line: reports and late replies.
+    /// As [`Self::flush`], but first takes the bytes that wait in the line: reports and late replies.
     fn take_waiting(&mut self) -> Result<(), Error> {
         loop {
             let has_bytes = self.link.receive(Duration::ZERO)?;

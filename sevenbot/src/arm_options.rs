@@ -1,10 +1,10 @@
-//! How an arm is talked to: baud rate, timeout and attempts.
+//! The options of the exchange with an arm: baud rate, timeout, attempts and register map.
 
 use std::time::Duration;
 
 use protocol_core::registers::map21::Map;
 
-/// Baud rate, timeout and attempts.
+/// Baud rate, timeout, attempts and register map.
 ///
 /// ```
 /// use sevenbot::ArmOptions;
@@ -23,7 +23,7 @@ pub struct ArmOptions {
     /// reply costs much less than `reply_timeout`: [`Patience`](host_link::Patience). A read changes nothing, so repeating it is
     /// safe.
     pub attempts: u32,
-    /// The register map to speak; `None`: the one that the arm's version tells.
+    /// The register map of the frames; `None`: the map that belongs to the arm's firmware version.
     pub map: Option<Map>,
 }
 

@@ -51,8 +51,8 @@ impl Arm {
         self.write(SPEED.address, &speeds.map(Speed::steps))
     }
 
-    /// Sets the durations of all joints' later moves. A duration applies where the speed is 0, the maximum
-    /// ([D11](protocol_core::decisions#d11)).
+    /// Sets the durations of later moves of all joints, joint 1 first. A duration applies to a joint whose speed is 0, the
+    /// maximum ([D11](protocol_core::decisions#d11)).
     ///
     /// # Errors
     /// As [`Arm::write`].

@@ -63,7 +63,7 @@ impl BlockingLink {
         }
     }
 
-    /// The next event other than [`HostEvent::Wait`]; `None` if there is none before `deadline`.
+    /// Waits for the next event other than [`HostEvent::Wait`]. Returns `None` if there is none before `deadline`.
     pub(crate) fn next(&mut self, deadline: Option<Instant>) -> Result<Option<HostEvent>, PortError> {
         loop {
             let until = match self.poll()? {
@@ -82,8 +82,8 @@ impl BlockingLink {
 
     /// Hands the bytes that have arrived, or arrive within `timeout`, to the link. `false` if there are none.
     pub(crate) fn receive(&mut self, timeout: Duration) -> Result<bool, PortError> {
-        // The planned end of the wait. After a suspension the clock is later, and a reply may wait in the line: at that later
-        // time the link would give the read up.
+        // After a wait without bytes, the link gets the planned end of the wait, not the time of the clock. After a suspension
+        // of the computer the clock is much later: the link would give up a read although its reply waits in the line.
         let end = self.time_at(self.line.now() + timeout);
         let bytes = self.line.receive(timeout)?;
         self.received.bytes += bytes.len();
@@ -97,7 +97,7 @@ impl BlockingLink {
         self.line.now()
     }
 
-    /// The time since the line was opened.
+    /// The time since [`Self::new`], on the clock of the line.
     pub(crate) fn elapsed(&self) -> Duration {
         self.now().saturating_duration_since(self.start)
     }
@@ -107,7 +107,7 @@ impl BlockingLink {
         self.line.sleep(duration);
     }
 
-    /// The counts since the last call. `earlier_frames` counts the good frames before that.
+    /// Takes the counts since the previous call. Their `earlier_frames` counts the good frames before that call.
     pub(crate) fn take_received(&mut self) -> ReceiveCounts {
         let received = std::mem::take(&mut self.received);
         self.received.earlier_frames = received.earlier_frames + received.other_frames;

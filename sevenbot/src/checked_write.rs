@@ -29,7 +29,9 @@ use storage::not_stored;
 const WRITE_ATTEMPTS: u32 = 5;
 
 impl Arm {
-    /// Writes registers, and reads them back. A frame that seems to be lost is sent again, up to four times.
+    /// Writes registers, and reads them back. Sends a frame that seems to be lost again, up to four times.
+    ///
+    /// Before a write that makes the maker's firmware drive the joints, also makes the present positions the targets.
     ///
     /// ```
     /// use sevenbot::checked_write::WriteError;
@@ -161,8 +163,8 @@ impl Arm {
         (ends && hertz != 0 && !is_written).then(|| (row.address, vec![hertz]))
     }
 
-    /// Makes the present positions the targets before a write that makes the maker's firmware drive the joints. It would drive
-    /// each joint to its last target. Our firmware sets the targets itself (D13).
+    /// Makes the present positions the targets before a write that makes the maker's firmware drive the joints. Otherwise
+    /// that firmware would drive each joint to its last target. Our firmware sets the targets itself (D13).
     fn prepare_torque(&mut self, writes: &[(u8, Vec<u8>)]) -> Result<(), Error> {
         let new_state = |(address, values): &(u8, Vec<u8>)| {
             values.get(usize::from(MOTOR_STATE.address.checked_sub(*address)?)).copied()
@@ -180,7 +182,7 @@ impl Arm {
         writes: &[&(u8, Vec<u8>)],
         locked: bool,
     ) -> Result<Vec<Snapshot>, Error> {
-        // The maker's firmware takes a locked setting, but only until the next restart: it does not store it. So do not send it.
+        // While the lock is closed, the maker's firmware takes a setting but does not store it. So do not send the setting.
         let skips_settings = locked && self.identity().firmware() == Firmware::Makers;
         for (address, values) in writes {
             if !(skips_settings && cause_from_access(*address, locked) == Some(MismatchCause::Locked)) {

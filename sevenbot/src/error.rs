@@ -31,10 +31,10 @@ pub enum OpenError {
     /// Another program has the port open.
     #[error("another program has this port open")]
     Busy,
-    /// The port cannot be used as a serial port, with the reason of the system.
+    /// The port cannot be used as a serial port, or the server cannot be used. Holds the reason as text.
     #[error("this port cannot be used: {0}")]
     Unusable(String),
-    /// The port opened, but no arm answered.
+    /// The port opened, but then no arm answered, or the port failed.
     #[error(transparent)]
     Silent(#[from] Error),
     /// The device is not a 7Bot V2: its device code is not 7.
@@ -62,7 +62,7 @@ pub enum OpenError {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Error {
-    /// The registers reach past 255, or there are more than one frame holds. Nothing was sent.
+    /// The registers reach past 255, or one frame does not hold all of them. Nothing was sent.
     #[error("{count} registers from {address} on: the last register is 255, and one frame holds 255 values")]
     OutsideMap {
         /// The first register.
@@ -100,12 +100,12 @@ pub enum PortError {
     /// The port takes no more bytes: no program reads at its other end.
     #[error("the port takes no more bytes: nothing reads at its other end")]
     Stalled,
-    /// The port failed: the cable was pulled, or the simulator ended.
+    /// The port failed, for example because the cable was pulled, or the simulator or the server ended.
     #[error("the connection is gone{}", reason(*.0))]
     Lost(io::ErrorKind),
 }
 
-/// The reason of the system, if it has a name.
+/// The reason of the system after a colon; empty if it has no name.
 fn reason(kind: io::ErrorKind) -> String {
     match kind.to_string().as_str() {
         "other error" | "uncategorized error" => String::new(),

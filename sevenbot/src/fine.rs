@@ -63,9 +63,9 @@ impl Arm {
         }))
     }
 
-    /// Sets targets and reads them back. They are approached by speed or time, as whole degrees are: a set-point period
-    /// that another program left is switched off for these frames ([D23](protocol_core::decisions#d23)). Only for an
-    /// arm with the extended block.
+    /// Sets targets and reads them back. The joints approach them by speed or time, as they approach whole degrees: for
+    /// these frames, the set-point period that another program left is switched off
+    /// ([D23](protocol_core::decisions#d23)). Only for an arm with the extended block.
     ///
     /// # Errors
     /// As [`Arm::write_checked`].
@@ -74,8 +74,8 @@ impl Arm {
     }
 
     /// Runs `work` with the set-point period 0, so that fine targets are not points of a stream (D23). Then restores the
-    /// period, also after a failure, unless the other program has ended its stream meanwhile. Only for an arm with the
-    /// extended block.
+    /// period, also after a failure, unless the program that streams has ended its stream meanwhile. Only for an arm with
+    /// the extended block.
     pub(crate) fn without_set_point_period<T>(
         &mut self,
         work: impl FnOnce(&mut Self) -> Result<T, WriteError>,
@@ -104,7 +104,7 @@ impl Arm {
         Ok(())
     }
 
-    /// Has the other program ended its stream? Then it has changed the watchdog since `before`.
+    /// Has the program that streams ended its stream? Then it has changed the watchdog since `before`.
     fn is_stream_over(&mut self, before: &Snapshot) -> Result<bool, WriteError> {
         let watchdog = |registers: &Snapshot| registers.byte(&HOST_WATCHDOG);
         Ok(watchdog(&self.read_span(PERIOD_AND_WATCHDOG)?) != watchdog(before))

@@ -35,7 +35,7 @@ impl FineAngle {
     /// The largest angle, in hundredths of a degree.
     pub const MAX_HUNDREDTHS: u16 = Angle::MAX_DEGREES as u16 * PER_DEGREE;
 
-    /// `None` above 180 degrees, as for a joint that is not measured yet.
+    /// `None` above 180 degrees. A joint that is not measured yet has the register value 65535.
     #[must_use]
     pub const fn from_hundredths(hundredths: u16) -> Option<Self> {
         if hundredths <= Self::MAX_HUNDREDTHS { Some(Self(hundredths)) } else { None }
@@ -49,7 +49,7 @@ impl FineAngle {
         (0.0..=f64::from(Self::MAX_HUNDREDTHS)).contains(&hundredths).then_some(Self(hundredths as u16))
     }
 
-    /// The value of the register.
+    /// The angle in hundredths of a degree, as the registers hold it.
     #[must_use]
     pub const fn hundredths(self) -> u16 {
         self.0

@@ -31,7 +31,7 @@ pub struct FineState {
 }
 
 impl FineState {
-    /// The registers of a state.
+    /// The registers of a state: 142 to 183.
     pub const REGISTERS: Span = Span::between(&FINE_POSITION, &LOAD);
 
     /// From a read of [`Self::REGISTERS`]. Registers that the snapshot lacks count as 0.

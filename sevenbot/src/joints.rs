@@ -5,8 +5,8 @@
 //!                                                                              └──▶ targets that hold the arm
 //! ```
 //!
-//! Position 0 is either 0 degrees or, in the first half second after power-up, a joint that is not measured yet. No
-//! register tells the two apart, but a joint is measured if one of these holds:
+//! Position 0 is either 0 degrees or, in the first half second after power-up, a joint that is not measured yet. Only
+//! the extended block tells the two apart. On other arms, a joint is measured if one of these holds:
 //!
 //! - Register 242 lists a missing servo, because the arm lists one only after start-up.
 //! - The joint is at rest with target 0, which is not the default of any joint.
@@ -24,7 +24,7 @@ use crate::units::Speed;
 use host_link::{Snapshot, Span};
 
 /// After power-up the arm measures each joint or finds it missing within 500 ms ([D12](protocol_core::decisions#d12)).
-/// The rest is for the reply.
+/// The other 200 ms are for the reply.
 pub const START_UP_TIME: Duration = Duration::from_millis(700);
 /// Time between two reads during start-up.
 pub(crate) const POLL_PERIOD: Duration = Duration::from_millis(20);
@@ -63,7 +63,7 @@ pub(crate) fn joints_of<T>(targets: &[Option<T>; 7]) -> u8 {
 }
 
 impl Arm {
-    /// The joints at this instant.
+    /// Reads the joints, and before them the status block if the firmware has one.
     ///
     /// # Errors
     /// As [`Arm::read`].
@@ -72,8 +72,8 @@ impl Arm {
         Ok(JointSnapshot::new(self.read_span(JointSnapshot::REGISTERS)?, status))
     }
 
-    /// Waits up to 0.7 s until no joint has the default target of power-up. The arm replaces these targets within half
-    /// a second ([D12](protocol_core::decisions#d12)). Returns the joints at that time.
+    /// Waits up to 0.7 s until no joint has the default target of power-up and stands elsewhere. The arm replaces these
+    /// targets within half a second ([D12](protocol_core::decisions#d12)). Returns the joints at the end of the wait.
     ///
     /// # Errors
     /// As [`Arm::read`].
@@ -90,7 +90,7 @@ impl Arm {
     }
 }
 
-/// All joints of an arm, from two reads.
+/// All joints of an arm, and its status block if the firmware has one.
 ///
 /// ```no_run
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {

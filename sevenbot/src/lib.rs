@@ -1,4 +1,4 @@
-//! Connects to a 7Bot V2 arm over its serial port.
+//! Connects to a 7Bot V2 arm: over its serial port, through a server, or in a simulation.
 //!
 //! ```text
 //!   Arm ── read, write, typed values ──▶ HostLink ──▶ serial port ──▶ arm, simulator, or emulated firmware
@@ -7,7 +7,7 @@
 //!    └── reports ◀── sent by the arm (D14) ─┘
 //! ```
 //!
-//! All calls block, with timeouts. Frames and the register table come from `protocol-core`, which the arm uses too.
+//! Calls of [`Arm`] block, with timeouts. Frames and the register table come from `protocol-core`, which the arm uses too.
 //! `D1` to `D30` are rules in `docs/protocol.md`. The library sends targets; the arm plans the motion.
 //!
 //! ```no_run

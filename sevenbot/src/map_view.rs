@@ -121,8 +121,8 @@ impl MapView {
         self.map == Map::V22 && of_map21.peek().is_some() && !of_map21.any(starts_others)
     }
 
-    /// The map for those registers of a write that both maps have. It is the map of the other registers, so that one frame
-    /// holds all.
+    /// The map for the registers of a write that both maps have: the map of the write's other registers, so that one frame holds
+    /// all.
     fn default_map(self, address: u8, count: usize) -> Map {
         let has = |test: &dyn Fn(u8) -> bool| (address..=u8::MAX).take(count).any(test);
         let is_only_map22 = |address| FEEDBACK_FREQUENCY.holds(address) || PRESENT_POSITION.holds(address);
@@ -145,7 +145,7 @@ impl MapView {
     /// The ranges of registers that a report may hold.
     pub(crate) const fn reports(self) -> &'static [Span] {
         match self.map {
-            // By the value of register 189 (D26).
+            // One range for each value of register 189 (D26), from 0 on.
             Map::V22 => {
                 const {
                     &[
@@ -203,7 +203,7 @@ fn encode(address: u8, value: u8) -> u8 {
     map21::OFFSET.range.encode_byte(OFFSET.range.decode_byte(value)).unwrap_or(NO_OFFSET)
 }
 
-/// Sign and magnitude (D9) of 128 + offset.
+/// Converts an offset from 128 + offset to sign and magnitude (D9).
 fn offset_from_biased(value: u8) -> u8 {
     match value {
         0 | u8::MAX => 0,

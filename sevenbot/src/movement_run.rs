@@ -1,4 +1,4 @@
-//! One run of a movement: what is due, when it is over, and what was missed. Without an arm, input or output, or a clock.
+//! One run of a movement: the steps that are due, its end, and the counts of late points. Has no arm, input, output or clock.
 //!
 //! ```text
 //!   Approach, PointPath or steps ──▶ MovementRun ◀── time
@@ -22,13 +22,13 @@ use crate::stream::{PaceCounts, StreamPace};
 
 /// The measurements go on for this time after the end of a path, because servos lag.
 const TAIL: Duration = Duration::from_millis(300);
-/// After a longer pause of the program the movement goes on where it paused. The arm has stopped there, and would leap to a
-/// later point.
+/// After a longer pause of the program, the movement goes on where it paused: the arm has stopped there, and would leap if
+/// the next point were a later one.
 const LONGEST_PASSED_OVER: Duration = Duration::from_millis(200);
 /// After a longer pause the movement is over. A person may rely on an arm that has stopped.
 const LONGEST_PAUSE: Duration = Duration::from_secs(1);
 
-/// What is due.
+/// An action that is due, or the time until which there is none: the results of [`MovementRun::poll`].
 #[derive(Clone, Debug, PartialEq)]
 pub enum RunStep {
     /// Send this point of a stream.
@@ -66,7 +66,7 @@ enum Content {
     Steps(Vec<Step>),
 }
 
-/// A run that was begun.
+/// One run along a movement. [`Self::poll`] returns the steps that are due.
 ///
 /// ```
 /// use sevenbot::movement_run::{MovementRun, RunStep};
@@ -90,13 +90,13 @@ pub struct MovementRun {
     pace: StreamPace,
     /// The time along the movement of the point with number 0.
     base: Duration,
-    /// The time along the movement of the last thing that was sent.
+    /// The time along the movement of the last point or step that was sent.
     reached: Duration,
     /// The number of the next step in whole degrees.
     next_step: usize,
-    /// What the pump does; `None` if unknown.
+    /// Does the pump suck? `None` if unknown.
     vacuum: Option<bool>,
-    /// A point that is due after the pump was switched.
+    /// The point to send next, after the pump was switched.
     point: Option<FineTargets>,
     /// After the last point: when the run is over.
     end: Option<Duration>,
@@ -109,7 +109,7 @@ impl MovementRun {
         Self::new(Content::Way(way), None, now, period)
     }
 
-    /// Goes along a path, with a point each `period`. `vacuum` is what the pump does; `None` if unknown.
+    /// Goes along a path, with a point each `period`. `vacuum`: does the pump suck now? `None` if unknown.
     #[must_use]
     pub fn along(path: PointPath, vacuum: Option<bool>, now: Duration, period: Duration) -> Self {
         Self::new(Content::Path(path), vacuum, now, period)
@@ -186,7 +186,7 @@ impl MovementRun {
         self.base + time.saturating_sub(self.pace.start())
     }
 
-    /// When the next thing is due.
+    /// When the next point or step is due.
     fn due(&self) -> Duration {
         match &self.content {
             Content::Steps(steps) => {

@@ -25,7 +25,7 @@ pub enum NameError {
     /// The text after the dot is not a joint, 1 to 7.
     #[error("a joint is a number from 1 to 7")]
     NoJoint,
-    /// The row has no register for each joint.
+    /// The row does not have one register per joint.
     #[error("{} has no joints", name_of(.0))]
     NotPerJoint(&'static Register),
     /// The number is not an address, 0 to 255.
@@ -101,8 +101,7 @@ fn one_joint(row: &'static Register, joint: &str) -> Result<Span, NameError> {
     span.ok_or(NameError::NotPerJoint(row))
 }
 
-/// The registers of a row that a read shows. For a row that only map 2.1 has, these are the addresses that map 2.2 does
-/// not use.
+/// The part of a row that a read shows: of a row that only map 2.1 has, the addresses that map 2.2 does not use.
 fn shown(row: &Register) -> Span {
     let is_shown = |address: &u8| MAP.contains(row) || find_readable(*address) == Some(row);
     let addresses = || Span::of(row).addresses().filter(is_shown);

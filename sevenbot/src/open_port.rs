@@ -54,8 +54,8 @@ impl OpenPort {
 }
 
 impl OpenPort {
-    /// The number of bytes that a read asks for. On Windows a read may wait until all of them have arrived: only one combination
-    /// of timeouts makes it return with the first ones, and Wine and some drivers lack that rule.
+    /// The number of bytes that a read asks for. On Windows, only those that have arrived, or one: a read may wait until all
+    /// bytes have arrived, because Wine and some drivers lack the timeouts with which it returns after the first ones.
     fn readable_length(&self, longest: usize) -> serialport::Result<usize> {
         if !cfg!(windows) {
             return Ok(longest);

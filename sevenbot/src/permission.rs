@@ -1,6 +1,6 @@
 //! The group that may open a port, where ports are files.
 
-/// The group may read and write.
+/// The mode bits with which the group of a file may read and write it.
 #[cfg(unix)]
 const GROUP_READS_AND_WRITES: u32 = 0o060;
 

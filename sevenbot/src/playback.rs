@@ -18,7 +18,7 @@ pub(crate) const MAX_SEGMENT: Duration = Duration::from_millis(50);
 const SPEED_RESERVE: f64 = 1.2;
 /// A joint that moves by one degree and then rests spends at most this time on the degree.
 const MAX_DEGREE_DURATION: Duration = Duration::from_millis(250);
-/// Speed of the fastest joint during the approach to the first pose, in degrees/s.
+/// Speed of the joint with the longest way during the approach to the first pose, without the reserve, in degrees/s.
 const APPROACH_DEGREES_PER_SECOND: f64 = 30.0;
 /// The shortest duration of the approach.
 const MIN_APPROACH: Duration = Duration::from_millis(500);

@@ -1,4 +1,4 @@
-//! The serial ports of this machine, and which of them lead to an arm.
+//! The serial ports of this machine, the servers of this user, and which of them lead to an arm.
 
 use std::fs;
 use std::thread;

@@ -8,7 +8,7 @@ use arm_sim::{Simulation, SimulationConfig};
 use crate::error::PortError;
 use crate::host_line::HostLine;
 
-/// Time between two looks for received bytes: less than that of a byte at 9,600 baud.
+/// Time between two looks for received bytes: shorter than one byte at 9,600 baud.
 const POLL_PERIOD: Duration = Duration::from_millis(1);
 /// How long the arm has been on when its line opens, so that its servos are measured.
 const ON_BEFORE: Duration = Duration::from_secs(1);
@@ -29,7 +29,7 @@ pub fn simulated_port(name: &str) -> Option<u64> {
     }
 }
 
-/// The host's end of the line of a simulated arm, whose time is that of the computer.
+/// The host's end of the line to a simulated arm that runs in real time.
 ///
 /// The arm exists as long as the line, with factory settings. The simulation runs only while the line is used; each use
 /// first lets it catch up with the computer's clock.
@@ -52,7 +52,7 @@ pub struct RealTimeLine {
 }
 
 impl RealTimeLine {
-    /// Switches an arm on, a second ago. Faults of its line are drawn from `seed`.
+    /// A line to a new arm that has been on for one second. Faults of its line are drawn from `seed`.
     #[must_use]
     pub fn new(seed: u64) -> Self {
         let mut simulation = Simulation::new(SimulationConfig::default());

@@ -30,9 +30,9 @@ use host_link::{Snapshot, Span};
 pub struct RegisterEntry {
     /// The first register.
     pub address: u8,
-    /// The name.
+    /// The name, as [`name_of_register`] gives it.
     pub name: String,
-    /// The bytes.
+    /// The raw bytes, in the order of the registers.
     pub bytes: Vec<u8>,
     /// The number in the table's unit, as `sevenbot set` takes it.
     pub value: String,
@@ -173,7 +173,7 @@ pub const fn motor_state_name(state: u8) -> &'static str {
     }
 }
 
-/// The reason of the last refusal.
+/// The reason of the last refusal, for a value of register 244.
 #[must_use]
 pub const fn refusal_reason(reason: u8) -> &'static str {
     match reason {
@@ -188,13 +188,13 @@ pub const fn refusal_reason(reason: u8) -> &'static str {
     }
 }
 
-/// The faults in these bits.
+/// The names of the faults in these bits of register 241; `none` if no bit is set.
 #[must_use]
 pub fn faults(bits: u8) -> String {
     set_words(bits, &FAULT_BITS.map(|(bit, problem)| (bit, problem.name())))
 }
 
-/// The alarms of servos in these bits of register 197 ([D28](protocol_core::decisions#d28)).
+/// The alarms of servos in these bits of register 197 ([D28](protocol_core::decisions#d28)); `none` if no bit is set.
 #[must_use]
 pub fn servo_alarms(bits: u8) -> String {
     set_words(bits, &ALARM_BITS.map(|(bit, problem)| (bit, problem.name())))
@@ -214,7 +214,7 @@ fn options(bits: u8) -> String {
     list(biased.into_iter().chain(alarms).collect()).unwrap_or_else(|| "none".to_owned())
 }
 
-/// The limits in these bits.
+/// The names of the limits in these bits of register 188; `none` if no bit is set.
 #[must_use]
 pub fn limits(bits: u8) -> String {
     set_words(bits, &[(limit::LINKAGE, "linkage"), (limit::CLAW, "claw")])
@@ -228,7 +228,7 @@ const fn report_content_name(content: u8) -> &'static str {
     }
 }
 
-/// The joints in these bits.
+/// The joints in these bits, as `joints 2 and 3`; `none` if no bit is set.
 #[must_use]
 pub fn joints(bits: u8) -> String {
     let set = Joint::ALL.iter().filter(|joint| bits & joint.bit() != 0);
@@ -242,7 +242,7 @@ fn list(mut words: Vec<String>) -> Option<String> {
     Some(if words.is_empty() { last } else { format!("{} and {last}", words.join(", ")) })
 }
 
-/// The range of the register at `address`, such as `0 to 180`.
+/// The range of the register at `address`, such as `0 to 180`; empty if the table has no register there.
 #[must_use]
 pub fn range(address: u8) -> String {
     find_readable(address).map_or_else(String::new, |row| match (row.range, row.range.bounds()) {

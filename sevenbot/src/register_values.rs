@@ -61,7 +61,7 @@ pub fn bytes(span: Span, values: &[i32]) -> Result<Vec<u8>, ValueError> {
     Ok(bytes)
 }
 
-/// As [`bytes()`], with one byte for each address, which is not checked.
+/// As [`bytes()`], but takes one byte for each address, and does not check the registers' ranges.
 ///
 /// # Errors
 /// The numbers are too few, too many or no bytes.

@@ -18,11 +18,12 @@ use host_link::{Snapshot, Span};
 /// Reports kept until the caller takes them: 20 s at 50 Hz, the highest rate of map 2.2 (D14). The oldest are dropped first.
 const REPORTS_KEPT: usize = 1_000;
 
-/// A report has seven bytes besides its values, all of ten bits, and reports fill at most half of the line (D14).
+/// The number of bytes in a report besides its values.
 const REPORT_OVERHEAD: u32 = 7;
+/// Ten bits of each byte, counted twice: reports fill at most half of the line (D14).
 const BITS_PER_BYTE: u32 = 2 * 10;
 
-/// The present positions, and what else register 189 asks for. The arm sends them without a request
+/// The present positions, and velocities and loads if register 189 asks for them. The arm sends reports without a request
 /// ([D14](protocol_core::decisions#d14), [D26](protocol_core::decisions#d26)).
 ///
 /// ```no_run

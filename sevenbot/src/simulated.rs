@@ -22,9 +22,9 @@
 //! # }
 //! ```
 //!
-//! Virtual time passes only while the program waits for a reply, in [`Arm::sleep`], and where a call of
-//! [`SharedSimulation::with`] advances it. So a program may compute as long as it likes, and gives the same result on every
-//! machine. [`RealTimeLine`] is an arm in the time of the computer: the port `sim` of the programs.
+//! Virtual time passes only while the program waits for a reply or a report, in [`Arm::sleep`], and where a call of
+//! [`SharedSimulation::with`] advances it. So the result does not depend on how long the program computes, and is the same
+//! on every machine. [`RealTimeLine`] is an arm in real time: the port `sim` of the programs.
 
 use std::io::ErrorKind;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -57,7 +57,7 @@ pub fn arm_with(config: SimulationConfig, options: ArmOptions) -> Result<(Arm, S
     Ok((Arm::over(Box::new(simulation.line()), "simulated", options)?, simulation))
 }
 
-/// A simulation that an [`Arm`] and a test share.
+/// A simulation that an [`Arm`] shares with the program that observes or changes it.
 #[derive(Clone, Debug)]
 pub struct SharedSimulation {
     simulation: Arc<Mutex<Simulation>>,
@@ -81,7 +81,7 @@ impl HostClock {
 }
 
 impl SharedSimulation {
-    /// Shares a simulation.
+    /// Makes a simulation that can be shared. [`Self::line`] leads to its arm.
     #[must_use]
     pub fn new(simulation: Simulation) -> Self {
         Self { simulation: Arc::new(Mutex::new(simulation)), clock: Arc::default() }

@@ -51,7 +51,7 @@ const FRAMES_BETWEEN_READINGS: u32 = 4_096;
 /// A restart remains undetected
 /// - if the first reading was less than 4,096 + `frames` before the counter wraps,
 /// - if the arm has accepted more frames since the restart than before it,
-/// - at all readings that are so far apart that `frames` reaches the range of the counter: 37 s at 115200 baud.
+/// - if the readings are so far apart that 4,096 + `frames` reaches the range of the counter: 37 s at 115200 baud.
 pub(crate) fn has_restarted(before: u16, after: u16, frames: u32) -> bool {
     u32::from(after.wrapping_sub(before)) > frames.saturating_add(FRAMES_BETWEEN_READINGS)
 }
@@ -64,7 +64,7 @@ impl From<Snapshot> for StatusBlock {
 }
 
 impl StatusBlock {
-    /// The registers.
+    /// The snapshot that holds registers 240 to 255.
     #[must_use]
     pub const fn registers(&self) -> &Snapshot {
         &self.0

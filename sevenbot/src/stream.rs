@@ -78,7 +78,7 @@ impl StreamOptions {
         Some(Self { period_ms, watchdog: (Self::WATCHDOG_STEPS, WatchdogAction::Hold) })
     }
 
-    /// With another watchdog: its time in steps of 10 ms, 0 for none, and what it does.
+    /// With another watchdog: its time in steps of 10 ms, 0 for none, and its action.
     #[must_use]
     pub const fn with_watchdog(self, steps: u8, action: WatchdogAction) -> Self {
         Self { watchdog: (steps, action), ..self }
@@ -161,7 +161,7 @@ impl From<WriteError> for StreamError {
 pub struct SetPointStream<'a> {
     arm: &'a mut Arm,
     options: StreamOptions,
-    /// The registers of the stream before it; `None` once they are put back.
+    /// The values that the stream's registers had before; `None` once they are put back, or left to the watchdog.
     before: Option<Vec<u8>>,
     last_sent: Duration,
     /// Watches over the joints that got a point.
@@ -189,7 +189,8 @@ impl<'a> SetPointStream<'a> {
     /// Sends a point at once. A joint without an angle gets no point.
     ///
     /// # Errors
-    /// The port failed. The arm does not answer, so a refused point is no error: see [`StatusBlock`](crate::StatusBlock).
+    /// The port failed. The arm does not answer writes, so a refused point is no error: see
+    /// [`StatusBlock`](crate::StatusBlock).
     pub fn send(&mut self, point: &FineTargets) -> Result<(), Error> {
         for (address, values) in fine_frames(point) {
             self.arm.write(address, &values)?;

@@ -90,7 +90,7 @@ impl Traffic {
         }
     }
 
-    /// The request in the bytes that a link sends: one frame.
+    /// The request in a frame that a link sends; `None` if the bytes are no good frame.
     #[must_use]
     pub fn sent(frame: &[u8]) -> Option<Self> {
         match frame::parse::<ToArm>(frame) {

@@ -68,7 +68,7 @@ impl Speed {
         if steps <= 100 { Some(Self(steps)) } else { None }
     }
 
-    /// The largest speed of at most this many degrees/s, 1.9 to 190. `None` outside of that.
+    /// The largest step that is not faster than this many degrees/s. `None` outside 1.9 to 190.
     #[must_use]
     pub fn at_most(degrees_per_second: f64) -> Option<Self> {
         // Tolerates rounding errors, so that the computed speed of a step finds this step.
@@ -116,7 +116,7 @@ impl MoveTime {
         if steps <= 100 { Some(Self(steps)) } else { None }
     }
 
-    /// The shortest duration of at least this many seconds, up to 10. `None` outside of that.
+    /// The shortest duration of at least this many seconds. `None` for 0 or less, and above 10.
     #[must_use]
     pub fn at_least(seconds: f64) -> Option<Self> {
         let found = (1..=100).map(Self).find(|time| time.duration().as_secs_f64() >= seconds - 0.001);

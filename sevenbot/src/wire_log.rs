@@ -6,7 +6,8 @@
 //!   14377 < aa770103...        the arm sent these
 //! ```
 //!
-//! The lines after the first are those of a recorded session ([`arm_sim::session`]). [`entries`] reads both kinds of file.
+//! The lines after the first have the format of a recorded session ([`arm_sim::session`]). [`entries`] reads both kinds of
+//! file.
 
 use std::fmt;
 use std::io::{self, Write};
@@ -18,7 +19,7 @@ use protocol_core::time;
 use crate::error::PortError;
 use crate::host_line::HostLine;
 
-/// The first word of a log, and that of a recorded session.
+/// The first words of a log, and of a recorded session.
 const HEADS: [&str; 2] = ["7bot-log 1", "7bot-session 1"];
 
 /// A line to an arm that logs its bytes.
@@ -26,12 +27,12 @@ pub struct LoggedLine<L> {
     line: L,
     log: Box<dyn Write + Send>,
     start: Instant,
-    /// The log could not be written: it has ended.
+    /// Did a write of the log fail? Then the log has ended.
     is_full: bool,
 }
 
 impl<L: HostLine> LoggedLine<L> {
-    /// Logs the bytes of a line. `port` and `baud` are told in the first line of the log.
+    /// Logs the bytes of a line. The first line of the log names `port` and `baud`.
     ///
     /// # Errors
     /// The log cannot be written.
@@ -92,7 +93,7 @@ pub enum Sender {
     Arm,
 }
 
-/// Bytes in a log.
+/// Bytes that one side sent.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LogEntry {
     /// Since the start of the log, or in a recorded session since power-up.

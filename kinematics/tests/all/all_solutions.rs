@@ -1,4 +1,4 @@
-//! Positions with more than one solution: both ends of joint 1, both ends of joint 4.
+//! All solutions of a position: both ends of joint 1, both ends of joint 4, positions with one solution, random poses.
 
 use kinematics::limits::check_arm;
 use kinematics::{NoSolution, Vector, forward, ik5, ik5_all, ik6, ik6_all};

@@ -1,4 +1,4 @@
-//! Poses that a solution with one branch misses, and poses at the ends of the joints.
+//! Poses that a solution with one branch misses, poses at the ends of the joints, and the reasons of refusals.
 
 use kinematics::limits::{check_arm, linkage};
 use kinematics::{Float, NoSolution, Vector, forward, ik5, ik6, ik7};
@@ -64,7 +64,8 @@ fn a_hand_bent_to_the_side_has_joint_5_below_90() {
     }
 }
 
-/// All poses in which each joint is at an end or in the middle, or the linkage at an end.
+/// All poses in whole degrees in which joint 2, joint 3 or the linkage is at an end, and each other joint is at 0, 90 or 180
+/// degrees.
 fn poses_at_limits() -> impl Iterator<Item = [f64; 6]> {
     const ENDS: [f64; 3] = [0.0, 90.0, 180.0];
     let elbows = (0..=180).flat_map(|t2| (0..=180).map(move |t3| (f64::from(t2), f64::from(t3))));

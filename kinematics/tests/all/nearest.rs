@@ -1,4 +1,4 @@
-//! The nearest point within reach, against all poses of a fine grid.
+//! The nearest point within reach: against all poses of a fine grid, in `f32`, and at special points.
 
 use fastrand::Rng;
 use kinematics::limits::check_arm;

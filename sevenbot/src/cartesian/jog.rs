@@ -53,8 +53,8 @@ pub enum JogRefusal {
 }
 
 impl Jog {
-    /// A step by `millimetres`. It starts at the exact position of the jog `before` if the arm's targets are still those of
-    /// that jog, otherwise at the position of the targets. The guard checks the end and the way there; `None`: no guard.
+    /// A step by `millimetres`. It starts at the exact position of the jog `before` if `targets` equals the targets of that
+    /// jog, otherwise at the position of `targets`. The guard checks the end and the way there; `None`: no guard.
     ///
     /// # Errors
     /// The new position is out of reach, or the guard does not allow it or the way there.

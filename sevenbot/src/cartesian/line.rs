@@ -1,4 +1,4 @@
-//! Plans a straight line of the tip, checks all of it, and rounds it to what the arm takes.
+//! Plans a straight line of the tip, checks the whole line, and rounds it to targets that the arm takes.
 //!
 //! ```text
 //!   start, end, speed ──▶ TipPath: tip and tool at any fraction of the line
@@ -48,15 +48,15 @@ pub struct StraightLine {
     pub duration: Duration,
     /// The movement of the joints.
     pub recording: Recording,
-    /// The largest distance of the tip from the line that rounded angles cause, in millimetres.
+    /// The largest distance of the tip from the line, in millimetres. Rounded angles cause it.
     pub deviation_mm: f64,
-    /// The largest tilt of the tool that rounded angles cause, in degrees.
+    /// The largest angle of the tool to its exact direction, in degrees. Rounded angles cause it.
     pub tilt_degrees: f64,
     /// The angle to which joint 4 turns before the line starts, without moving tip or tool. `None` if it stays.
     pub first_turn: Option<FineAngle>,
 }
 
-/// The request for a line.
+/// The line to plan, and the state of the arm at its start.
 #[derive(Clone, Copy, Debug)]
 pub struct StraightLineRequest {
     /// The targets of the arm at rest, joint 1 first.
@@ -105,13 +105,13 @@ impl StraightLine {
         })
     }
 
-    /// The targets in the order of time, joint 1 first. The time between two is a period of the resolution, or a little less.
+    /// The targets in the order of time, joint 1 first. The time between two is at most [`TargetResolution::period`].
     pub fn targets(&self) -> impl Iterator<Item = [FineAngle; 7]> {
         self.recording.moments().map(|moment| moment.pose)
     }
 }
 
-/// The division of a line in time.
+/// Divides the duration of a line into periods, and each period into checks.
 struct LineTiming {
     duration: Duration,
     /// The number of targets after the first.
@@ -198,8 +198,8 @@ impl LineTiming {
     }
 }
 
-/// The guard along a line. Targets in whole degrees are checked as well as the exact angles, since they are up to 3 mm from
-/// the line.
+/// Checks a line against the guard: the exact angles, and also targets in whole degrees, which are some millimetres away
+/// from the line.
 struct GuardedLine<'a> {
     path: &'a TipPath,
     guard: Option<Guard>,
@@ -247,7 +247,7 @@ impl JointTurn {
     }
 }
 
-/// The solution at this fraction of the line that is nearest to the angles before.
+/// Of the solutions at this fraction of the line, the one nearest to the previous angles.
 fn solved(
     path: &TipPath,
     share: f64,
@@ -267,7 +267,7 @@ fn solved(
         angles.iter().zip(before).map(|(angle, before)| (angle - before).abs()).fold(0.0, f64::max)
     };
     let free = |mut angles: Angles| {
-        // With the tool in line with the forearm, any angle of joint 4 is a solution. It keeps its own.
+        // With the tool in line with the forearm, any angle of joint 4 is a solution. Joint 4 keeps its angle.
         if let ([_, _, _, t4, t5], [_, _, _, before, _]) = (&mut angles, before)
             && (*t5 - IN_LINE).abs() < 1e-6
         {

@@ -74,7 +74,7 @@ fn degrees_per_count(joint: Joint) -> f64 {
     f64::from(from.abs_diff(to)) / 1e6 / f64::from(COUNTS)
 }
 
-/// The position of the tip, and the direction of the tool.
+/// The positions of tip and wrist, and the direction of the tool.
 ///
 /// ```
 /// use sevenbot::Angle;

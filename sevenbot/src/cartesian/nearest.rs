@@ -14,9 +14,9 @@ use super::{Vector, rounded};
 
 /// Grid points in a millimetre.
 const TENTHS: f64 = 10.0;
-/// The spacing of the coarsest grid, in millimetres, and the number of its points on each side of the middle. Each finer grid
-/// has half the spacing.
+/// The spacing of the coarsest grid, in millimetres. Each finer grid has half the spacing of the previous one.
 const COARSE: f64 = 256.0 * FINE;
+/// Points of the coarsest grid on each side of its middle, along each axis.
 const COARSE_STEPS: i32 = 16;
 /// The middle of the coarsest grid: above the shoulder.
 const MIDDLE: Vector = Vector::new(0.0, 0.0, 75.0);
@@ -31,7 +31,7 @@ pub(super) fn nearest(tip: Vector, tool: Vector, guard: Option<&Guard>) -> Optio
     exact.and_then(|point| wish.best(around(point, FINE, 2))).or_else(|| wish.searched())
 }
 
-/// The requested position, which the arm cannot or may not take, and what limits a point near it.
+/// A requested position that the arm cannot or may not take. Searches the nearest allowed point.
 struct Wish<'a> {
     tip: Vector,
     tool: Vector,
@@ -63,7 +63,7 @@ impl Wish<'_> {
         Some(nearest)
     }
 
-    /// The nearest of the points that are allowed.
+    /// The allowed point among `points` that is nearest to the requested tip.
     fn best(&self, points: impl Iterator<Item = Vector>) -> Option<Vector> {
         let mut best: Option<Vector> = None;
         for point in points {
@@ -132,7 +132,7 @@ mod tests {
         assert!(ik6(found, up).is_ok() && (found - tip).length() < 250.0, "{found:?}");
     }
 
-    /// The point as it is printed and typed again.
+    /// The point after a user has typed its printed text.
     fn typed(point: Vector) -> Vector {
         let text = PointText(point).to_string();
         let numbers: Vec<f64> = text.split(' ').map(|number| number.parse().expect("a number")).collect();

@@ -1,4 +1,4 @@
-//! Computes targets in whole degrees for a position of the tip.
+//! Rounds the exact angles for a position of the tip to targets in whole degrees or in hundredths.
 
 use kinematics::limits::check_arm;
 
@@ -48,8 +48,8 @@ pub struct FineTipTarget {
 }
 
 impl TipTarget {
-    /// Rounds each exact angle down or up, so that the arm can take the whole degrees and the miss is the smallest. Those that
-    /// the guard allows are preferred.
+    /// Rounds each exact angle down or up, so that the whole degrees are within the limits of the arm and the miss is the
+    /// smallest. Prefers degrees that the guard allows.
     pub(super) fn near(angles: [f64; 5], tip: Vector, tool: Vector, guard: Option<&Guard>) -> Self {
         let candidates = || (0..32).map(|choice| Self::with(angles, beside(angles, choice), tip, tool));
         let legal = || candidates().filter(|target| check_arm(target.pose()).is_ok());

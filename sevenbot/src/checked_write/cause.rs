@@ -76,12 +76,12 @@ impl MismatchCause {
     }
 }
 
-/// Why a server does not pass on what a program writes.
+/// Why a server does not pass on the writes of a program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ServerReason {
-    /// It was started with `--read-only`.
+    /// The server was started with `--read-only`.
     ReadOnly,
-    /// A stop of another program ended what this one sends.
+    /// Another program's stop ended the stream of this program.
     Stopped,
     /// The server lets one program at a time move the arm, and another one moves it now.
     AnotherDrives,
@@ -99,7 +99,8 @@ impl ServerReason {
     }
 }
 
-/// The firmware's reason why no write can change a register; `None` if a write can.
+/// The firmware's reason why a register is not written: the firmware lacks it, or a write would start a motion. `None` if it
+/// can be written.
 pub(super) fn cause_from_arm(view: MapView, address: u8) -> Option<MismatchCause> {
     match () {
         () if !view.serves(address) => Some(MismatchCause::NotServed),
@@ -110,7 +111,7 @@ pub(super) fn cause_from_arm(view: MapView, address: u8) -> Option<MismatchCause
     }
 }
 
-/// The table's reason why no write can change a register; `None` if a write can.
+/// The table's reason why a write does not change a register; `None` if a write can change it.
 pub(super) fn cause_from_access(address: u8, locked: bool) -> Option<MismatchCause> {
     match find_readable(address) {
         None => Some(MismatchCause::NoRegister),

@@ -67,7 +67,7 @@ impl NotTaken {
 /// Why a verified write failed.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum WriteError {
-    /// These registers did not take their values.
+    /// These registers did not take or keep their values.
     #[error(transparent)]
     NotTaken(#[from] NotTaken),
     /// An exchange with the arm failed. The arm may have taken some of the values.

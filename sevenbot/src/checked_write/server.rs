@@ -10,8 +10,8 @@ use crate::arm::Arm;
 const SERVER: Option<Span> = Span::new(FIRST, 7);
 
 impl Arm {
-    /// The same registers. If the arm gives no cause and a server between does not pass writes on, the server's reason is the
-    /// cause.
+    /// Returns the same registers. Where the arm gives no cause and a server in between does not pass writes on, the cause
+    /// becomes the server's reason.
     pub(crate) fn explained_by_server(&mut self, NotTaken(mut lost): NotTaken) -> NotTaken {
         let is_unknown = |register: &&mut WriteMismatch| register.cause == MismatchCause::Unknown;
         let mut unknown = lost.iter_mut().filter(is_unknown).peekable();
@@ -23,7 +23,7 @@ impl Arm {
         NotTaken(lost)
     }
 
-    /// `None` if there is no server, or if it passes writes on.
+    /// `None` if there is no server, if it passes writes on, or if its registers cannot be read.
     fn server_reason(&mut self) -> Option<ServerReason> {
         if !self.identity().has_status_block() {
             return None;

@@ -7,8 +7,8 @@ use super::mismatch::WriteMismatch;
 use crate::status_block::StatusBlock;
 use crate::table::settings;
 
-/// The settings among these writes, if the arm could not store them. Their registers hold the values. A storage that becomes
-/// full sets the same fault bit, also if these settings were the last ones that it stored.
+/// The settings among these writes, if the fault bit of the settings storage is set. Their registers hold the values. The
+/// bit is also set when the storage becomes full, even if it stored these settings as the last ones.
 pub(super) fn not_stored(writes: &[(u8, Vec<u8>)], after: Option<&StatusBlock>) -> Vec<WriteMismatch> {
     if after.is_none_or(|status| status.faults() & fault::SETTINGS_STORAGE == 0) {
         return Vec::new();

@@ -1,4 +1,4 @@
-//! Checks during a move whether the arm still carries it out, and tells why it does not.
+//! Checks during a move whether the arm still carries out the move, and gives the reason if it does not.
 //!
 //! ```text
 //!   MoveCheck::begin ──▶ check, check, ... (waits for the answer)   ──▶ Ok, or MoveCheckError::Problems
@@ -21,7 +21,7 @@ use host_link::Snapshot;
 /// Why an arm does not carry out a move.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum MoveCheckError {
-    /// These problems end the move. Each tells what to do: [`ProblemKind::remedy`](super::ProblemKind::remedy).
+    /// These problems end the move. [`ProblemKind::remedy`](super::ProblemKind::remedy) says what to do.
     #[error("{}", sentences(.0))]
     Problems(Vec<Problem>),
     /// The motors do not drive the joints.
@@ -63,9 +63,9 @@ pub struct MoveCheck(MoveWatch);
 /// What an arm does during a move.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct MoveState {
-    /// The joints whose set-point moves; `None` if the firmware does not tell.
+    /// The joints whose set-point moves, as [`Joint::bit`](crate::Joint::bit)s; `None` if the firmware does not tell.
     pub moving: Option<u8>,
-    /// The joints whose servo does not answer.
+    /// The joints whose servo does not answer, likewise; 0 if the firmware does not tell.
     pub missing: u8,
     /// Does joint 7, a gripper, hold something?
     pub is_gripping: bool,
@@ -101,7 +101,7 @@ impl MoveCheck {
         Self(self.0.with_period(milliseconds))
     }
 
-    /// The joints that it watches over, as [`Joint::bit`](crate::Joint::bit)s.
+    /// The watched joints, as [`Joint::bit`](crate::Joint::bit)s.
     #[must_use]
     pub const fn joints(&self) -> u8 {
         self.0.joints()
@@ -115,7 +115,8 @@ impl MoveCheck {
     /// Asks the arm, and waits for its answer.
     ///
     /// # Errors
-    /// [`MoveCheckError::Problems`] and [`MoveCheckError::NotDriven`] end the move. Also the errors of [`Arm::read`].
+    /// [`MoveCheckError::Problems`], [`MoveCheckError::NotDriven`] or [`MoveCheckError::StoppedByAnother`]: the move has ended.
+    /// Also the errors of [`Arm::read`].
     pub fn check(&mut self, arm: &mut Arm) -> Result<MoveState, MoveCheckError> {
         let registers = self.read(arm)?;
         Ok(registers.map_or_else(MoveState::default, |registers| MoveState {
@@ -133,7 +134,7 @@ impl MoveCheck {
     /// Checks the answer that has arrived, and asks again when it is time. Waits only after a fault, to read its cause.
     ///
     /// # Errors
-    /// As [`Self::check`]. Also if the last questions, three or more in 1.5 s, were not answered.
+    /// As [`Self::check`]. Also [`MoveCheckError::Exchange`] if no answer came for 1.5 s, to three questions or more.
     pub fn poll(&mut self, arm: &mut Arm) -> Result<(), MoveCheckError> {
         if !arm.identity().has_status_block() {
             return Ok(());

@@ -12,7 +12,7 @@ use crate::fine_angle::FineAngle;
 use crate::units::Angle;
 use host_link::Snapshot;
 
-/// The claw. While the effector is a gripper, an obstacle is what it holds.
+/// The claw. While the effector is a gripper, an obstacle of this joint is a held object.
 pub(super) const CLAW: Option<Joint> = Joint::new(7);
 /// A joint at rest within this distance of its target counts as there: under a load a servo stops a few degrees short.
 const AT_TARGET_DEGREES: f64 = 3.0;

@@ -79,7 +79,7 @@ pub struct Health {
 }
 
 impl Arm {
-    /// The health of the arm, from two reads. With the maker's firmware there is one read, and most values are `None`.
+    /// The health of the arm, from two reads. Other firmware than this project's needs one read, and most values are `None`.
     ///
     /// # Errors
     /// As [`Arm::read`].
@@ -104,7 +104,7 @@ impl Arm {
 }
 
 impl Health {
-    /// From registers 0 to 255. Registers of a block that the firmware lacks are 0.
+    /// From registers 0 to 255, with 0 in the registers of each block that the firmware lacks.
     #[must_use]
     pub fn new(registers: &Snapshot) -> Self {
         let has_status = registers.has_status_block();
@@ -164,7 +164,7 @@ impl Health {
     }
 }
 
-/// The joints with a problem, as [`Joint::bit`]s.
+/// The problems that registers 195 to 242 tell. Joints are [`Joint::bit`]s.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct ProblemFlags {
     silent: u8,
@@ -175,7 +175,7 @@ struct ProblemFlags {
 }
 
 impl ProblemFlags {
-    /// From registers 195 to 242; 0 where the firmware does not tell. `is_gripper`: register 30.
+    /// From registers 195 to 242; 0 where the firmware does not tell. `is_gripper`: does register 30 select the gripper?
     fn of(registers: &Snapshot, is_gripper: bool) -> Self {
         let guarded = |row| if registers.has_protection_block() { registers.byte(row) } else { 0 };
         let grips = CLAW.filter(|_| is_gripper).map_or(0, Joint::bit);

@@ -7,7 +7,7 @@ use std::fmt;
 use protocol_core::registers::Joint;
 use protocol_core::registers::map::{fault, servo_alarm};
 
-/// One kind of problem. The order is the order of importance.
+/// One kind of problem. The variants are in the order of importance, the most important first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum ProblemKind {
     /// The controller restarted while a program used the arm.
@@ -221,7 +221,7 @@ impl ProblemKind {
         self.texts().map_or("", |texts| texts.remedy)
     }
 
-    /// Does this problem end moves: those of its joint, or all moves if it is a problem of the arm?
+    /// Does this problem end moves? A problem of a joint ends the moves of that joint, a problem of the arm ends all moves.
     #[must_use]
     pub const fn ends_moves(self) -> bool {
         matches!(
@@ -266,7 +266,7 @@ impl ProblemKind {
 pub struct Problem {
     /// What is wrong.
     pub kind: ProblemKind,
-    /// The joint; `None` if the problem is that of the whole arm.
+    /// The joint; `None`: a problem of the whole arm.
     pub joint: Option<Joint>,
 }
 
@@ -293,13 +293,13 @@ impl fmt::Display for Problem {
     }
 }
 
-/// The problems as one text.
+/// The problems as one text, separated by semicolons.
 #[must_use]
 pub fn sentences(problems: &[Problem]) -> String {
     problems.iter().map(Problem::to_string).collect::<Vec<_>>().join("; ")
 }
 
-/// What to do about the problems: one line for each kind.
+/// What to do about the problems: one line for each kind, if problems of the same kind stand together.
 #[must_use]
 pub fn remedies(problems: &[Problem]) -> Vec<&'static str> {
     let mut kinds: Vec<ProblemKind> = problems.iter().map(|problem| problem.kind).collect();

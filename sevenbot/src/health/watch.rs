@@ -1,4 +1,4 @@
-//! Tells from the registers of an arm whether it still carries out a move: without input, output or a clock.
+//! Decides from the registers of an arm whether the arm still carries out a move. Does no input or output, and reads no clock.
 //!
 //! ```text
 //!   time ──▶ MoveWatch::question ──▶ the registers to ask for, or MoveFault::Silent
@@ -26,25 +26,26 @@ pub(super) const REGISTERS: Span = Span::between(&SET_POINT_PERIOD, &SERVO_TEMPE
 pub(super) const STATE_REGISTERS: Span = Span::between(&MOTOR_STATE, &EFFECTOR_TYPE);
 /// The shortest time between two questions.
 const POLL_PERIOD: Duration = Duration::from_millis(100);
-/// A new alarm that no joint explains is a problem after this time.
+/// A new alarm ends the move after this time. Until then the arm may report a joint that let go, which explains the alarm.
 const ALARM_GRACE: Duration = Duration::from_secs(3);
-/// The questions and their answers take at most one part in this many of the line's capacity.
+/// Questions and answers take at most 1/10 of the line's capacity.
 const SHARE_OF_LINE: u32 = 10;
 /// Bits of a question and its answer on the line: 7 bytes each around the values, ten bits a byte.
 const BITS_PER_CHECK: u32 = 10 * (7 + 7 + REGISTERS.count() as u32);
 /// Bits of the shortest frame on the line: seven bytes of ten bits.
 const BITS_OF_FRAME: u128 = 70;
-/// An arm that answers none of the last questions for this time is gone.
+/// An arm is silent after this time without an answer, if [`UNANSWERED_QUESTIONS`] were sent meanwhile.
 pub(super) const SILENCE: Duration = Duration::from_millis(1_500);
-/// The least number of unanswered questions before the arm is gone.
+/// The smallest number of unanswered questions after which an arm is silent.
 const UNANSWERED_QUESTIONS: u32 = 3;
-/// A joint that was blocked before the move has this time to get free: a point of a stream clears the flag only then (D27).
+/// A joint that was blocked before the move has this time to get free. A point of a stream does not clear the flag of a
+/// blocked joint, only free motion does (D27).
 const TIME_TO_GET_FREE: Duration = Duration::from_secs(2);
 
 /// Why an arm does not carry out a move.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum MoveFault {
-    /// These problems end the move. Each tells what to do: [`ProblemKind::remedy`].
+    /// These problems end the move. [`ProblemKind::remedy`] says what to do.
     Problems(Vec<Problem>),
     /// The motors do not drive the joints.
     NotDriven {
@@ -76,7 +77,7 @@ pub enum MoveFault {
 pub struct MoveWatch {
     /// The driven joints, as [`Joint::bit`](crate::Joint::bit)s.
     joints: u8,
-    /// Do the motors have to drive the joints? If not, they have to be measured only.
+    /// Do the motors have to drive the joints? If not, it is enough that the positions are measured.
     needs_motors: bool,
     /// The joints that have been blocked since before the move.
     blocked_before: u8,
@@ -84,20 +85,20 @@ pub struct MoveWatch {
     restarts_told: Option<u8>,
     /// The alarms at the first answer.
     alarms_before: Option<u8>,
-    /// When other alarms came.
+    /// When alarms other than `alarms_before` came; `None` if there are none now.
     alarm_since: Option<Duration>,
     is_at_end: bool,
-    /// Is the effector a gripper? Then an obstacle of joint 7 is what it holds.
+    /// Is the effector a gripper? Then an obstacle of joint 7 is a held object.
     is_gripper: bool,
     begun: Duration,
     baud: u32,
-    /// The arm's counter of frames in the last answer that had it, and a time before the arm read it: this program may take an
-    /// answer late.
+    /// The arm's counter of frames in the last answer that held it, and a time before the arm sent that answer. This program
+    /// may have taken the answer much later.
     accepted: Option<(Duration, u16)>,
     /// The set-point period that the arm must have while a stream is open.
     period_ms: Option<u16>,
     last_answer: Duration,
-    /// The time of the second last answer. The question of the last answer was sent after it.
+    /// The time of the answer before the last one. The question for the last answer was sent later.
     answer_before: Duration,
     unanswered: u32,
     question_period: Duration,
@@ -133,7 +134,7 @@ impl MoveWatch {
         }
     }
 
-    /// For a stream: from now on the arm has this set-point period, in milliseconds.
+    /// For a stream: the set-point period that the arm has from now on, in milliseconds. A different one ends the move.
     #[must_use]
     pub const fn with_period(mut self, milliseconds: u16) -> Self {
         self.period_ms = Some(milliseconds);
@@ -148,13 +149,13 @@ impl MoveWatch {
         self
     }
 
-    /// The joints that it watches over, as [`Joint::bit`](crate::Joint::bit)s.
+    /// The watched joints, as [`Joint::bit`](crate::Joint::bit)s.
     #[must_use]
     pub const fn joints(&self) -> u8 {
         self.joints
     }
 
-    /// Does joint 7, a gripper, hold something in these registers?
+    /// Do these registers show that joint 7 is a gripper and holds something?
     pub(super) fn is_gripping(&self, registers: &Snapshot) -> bool {
         ProblemFlags::of(registers, self.is_gripper).is_gripping
     }
@@ -172,10 +173,10 @@ impl MoveWatch {
         self.is_at_end = true;
     }
 
-    /// The registers to ask for now, if it is time for a question.
+    /// The registers to ask for now; `None` if no question is due. Counts the question as sent.
     ///
     /// # Errors
-    /// [`MoveFault::Silent`] if the last questions, three or more in 1.5 s, were not answered.
+    /// [`MoveFault::Silent`] if no answer came for 1.5 s, to three questions or more.
     pub fn question(&mut self, now: Duration) -> Result<Option<Span>, MoveFault> {
         if self.unanswered >= UNANSWERED_QUESTIONS && now >= self.last_answer + SILENCE {
             return Err(MoveFault::Silent);
@@ -229,8 +230,8 @@ impl MoveWatch {
         all.filter(|problem| self.needs_motors || problem.kind.hides_positions()).collect()
     }
 
-    /// The alarms that were not there at the first answer. A servo with an alarm may have switched itself off. The arm tells soon
-    /// whether a joint that it drives has let go, which says more.
+    /// The alarms that were not set at the first answer, after a grace time. A servo with an alarm may have switched itself off:
+    /// within that time the arm reports a driven joint that let go, which says more.
     fn new_alarms(&mut self, registers: &Snapshot, now: Duration) -> impl Iterator<Item = Problem> + use<> {
         let alarms = if registers.has_protection_block() { registers.byte(&SERVO_ALARMS) } else { 0 };
         let new = alarms & !*self.alarms_before.get_or_insert(alarms);
@@ -240,8 +241,9 @@ impl MoveWatch {
         ALARM_BITS.into_iter().filter(move |(bit, _)| due & bit != 0).map(|(_, kind)| Problem::of_arm(kind))
     }
 
-    /// Has the controller restarted since the last answer? A restart resets the counter of frames, and switches the stream
-    /// off. Behind a server another program may switch the stream off, so only the counter shows a restart.
+    /// Has the controller restarted since the last answer? A restart resets the counter of frames, switches the stream off,
+    /// and may set a bit of register 241. Behind a server another program may switch the stream off, so there the period is
+    /// no sign of a restart.
     fn has_restarted(&mut self, registers: &Snapshot) -> bool {
         if !registers.has_status_block() {
             return false;
@@ -250,7 +252,7 @@ impl MoveWatch {
         let newest = (self.answer_before, accepted);
         let (since, before) = self.accepted.replace(newest).unwrap_or(newest);
         let is_shared = SharingState::of(registers).is_some();
-        // The counter may not show it, if it was near its wrap.
+        // The counter may hide a restart if it was near its wrap.
         let told = registers.byte(&FAULTS) & (fault::WATCHDOG_RESTART | fault::BROWN_OUT_RESTART);
         let told_before = self.restarts_told.replace(told).unwrap_or(told);
         (self.has_other_period(registers) && !is_shared)
@@ -258,7 +260,7 @@ impl MoveWatch {
             || has_restarted(before, accepted, self.frames_since(since))
     }
 
-    /// The number of the shortest frames that the line can have carried since this time.
+    /// The largest number of frames that the line can have carried between this time and the last answer.
     fn frames_since(&self, time: Duration) -> u32 {
         let bits = self.last_answer.saturating_sub(time).as_millis() * u128::from(self.baud) / 1_000;
         u32::try_from(bits / BITS_OF_FRAME).unwrap_or(u32::MAX)

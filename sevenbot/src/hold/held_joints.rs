@@ -32,13 +32,13 @@ impl HeldJoints {
     /// The registers to read for the second argument of [`Self::new`] from an arm with the extended block.
     pub const FINE_REGISTERS: Span = Span::between(&FINE_TARGET, &LIMITS);
 
-    /// From the joints, and on an arm with the extended block a read that holds [`Self::FINE_REGISTERS`].
+    /// `fine` is a read that holds [`Self::FINE_REGISTERS`]; `None` for an arm without the extended block.
     #[must_use]
     pub const fn new(joints: JointSnapshot, fine: Option<Snapshot>) -> Self {
         Self { fine, joints }
     }
 
-    /// From registers 0 to 255. Registers of a block that the firmware lacks are 0.
+    /// From registers 0 to 255, with 0 in the registers of each block that the firmware lacks.
     #[must_use]
     pub fn of(registers: &Snapshot) -> Self {
         let status = registers.has_status_block().then(|| StatusBlock::from(registers.clone()));
@@ -69,7 +69,8 @@ impl HeldJoints {
         !is_start_up_over && self.measured(joint).is_none()
     }
 
-    /// The position of a joint that was measured since power-up, if the arm tells that.
+    /// The measured position in hundredths of a degree; `None` without the extended block, or if the joint was not measured
+    /// since power-up.
     fn measured(&self, joint: Joint) -> Option<u16> {
         let position = self.fine.as_ref()?.word(FINE_POSITION.of(joint));
         FineAngle::from_hundredths(position).map(FineAngle::hundredths)
@@ -110,8 +111,8 @@ impl HeldJoints {
         (!is_unknown && !can_wait).then_some(present.into())
     }
 
-    /// Does the joint rest at its target? Then it keeps the target ([D24](protocol_core::decisions#d24)): with its position as
-    /// the new target, it would droop again, by as much.
+    /// Does the joint rest at its target? Then it keeps the target ([D24](protocol_core::decisions#d24)): if the measured
+    /// position became the target, the joint would droop below it by the same distance again.
     fn rests_at_target(&self, joint: Joint, measured: u16) -> bool {
         let is_silent = self.joints.status.is_none() || self.joints.is_missing(joint);
         !is_silent && !self.joints.is_moving(joint) && self.target(joint).abs_diff(measured) <= DROOP
@@ -125,7 +126,7 @@ impl HeldJoints {
         frames_for(&TARGET_POSITION, &targets.map(|target| u8::try_from(target?).ok()))
     }
 
-    /// The targets that differ from what was sent.
+    /// The targets of the arm that differ from the targets that were sent.
     pub(super) fn lost_targets(
         &self,
         sent: &[Option<SentTarget>; 7],

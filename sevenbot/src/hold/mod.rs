@@ -54,7 +54,7 @@ impl Arm {
         self.hold_through_restarts().map(|(joints, _)| joints)
     }
 
-    /// As [`Arm::hold`]. Also tells whether the controller restarted meanwhile.
+    /// As [`Arm::hold`]. Also returns whether the controller restarted meanwhile.
     pub(crate) fn hold_through_restarts(&mut self) -> Result<(JointSnapshot, bool), HoldError> {
         let held = self.with_min_attempts(|arm| match arm.has_extended_block()? {
             true => arm.without_set_point_period(|arm| arm.hold_until_verified(true)),
@@ -172,13 +172,13 @@ impl Hold {
         Self::slowing_down(known, speeds)
     }
 
-    /// As [`Self::at_once`], after this stop: restores the speeds from before it.
+    /// A second stop after this one. As [`Self::at_once`], but restores the speeds from before the first stop.
     #[must_use]
     pub fn again(&self, known: Option<&HeldJoints>) -> Self {
         self.speeds.map_or_else(|| Self::at_once(known), |speeds| Self::slowing_down(known, speeds))
     }
 
-    /// Restores these speeds at the end, because the registers hold others for a while.
+    /// Restores these speeds at the end. For a stop while the registers hold other speeds temporarily, as during a playback.
     #[must_use]
     pub const fn restoring(mut self, speeds: [u8; 7]) -> Self {
         self.speeds = Some(speeds);
@@ -195,7 +195,7 @@ impl Hold {
             frames.push((SET_POINT_PERIOD.address, vec![0, 0]));
         }
         frames.push((SPEED.address, BRAKE.to_vec()));
-        // The joints may have moved on since: the first read replaces these targets.
+        // The joints may have moved since `known` was read: the first read replaces these targets.
         frames.extend(
             known.into_iter().flat_map(|known| known.frames(&known.targets_to_write(&[None; 7], false))),
         );

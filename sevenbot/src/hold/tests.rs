@@ -70,7 +70,7 @@ impl PlainArm {
     }
 }
 
-/// Carries out a stop of an arm. `comes` tells for each frame and each reply whether it arrives.
+/// Carries out a stop of an arm. `comes` decides for each frame and each reply whether it arrives.
 fn stop(
     hold: &mut Hold,
     arm: &mut PlainArm,

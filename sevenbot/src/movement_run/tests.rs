@@ -20,7 +20,7 @@ fn run() -> MovementRun {
     MovementRun::along(PointPath::new(&recording(), 1.0), Some(false), ms(5_000), PERIOD)
 }
 
-/// What happens until the run waits.
+/// All steps that are due at `now`, and the wait or the end after them.
 fn steps(run: &mut MovementRun, now: Duration) -> Vec<RunStep> {
     let all = std::iter::from_fn(|| Some(run.poll(now)));
     let is_end = |step: &RunStep| matches!(step, RunStep::Wait(_) | RunStep::Over | RunStep::Paused(_));

@@ -42,8 +42,8 @@ impl SetPointStream<'_> {
     /// Streams the way to a first point, if it has a length. Afterwards the next point is due.
     ///
     /// # Errors
-    /// The observer ended it, the port failed, or the arm does not follow: [`SetPointStream::check`]. The joints then stop at
-    /// the last point.
+    /// The observer ended the approach, this program paused for too long, the port failed, or the arm does not follow:
+    /// [`SetPointStream::check`]. The joints then stop at the last point.
     pub fn approach(&mut self, way: &Approach, observer: &mut dyn Observer) -> Result<(), MoveError> {
         if way.duration().is_zero() {
             return Ok(());

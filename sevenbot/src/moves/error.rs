@@ -31,7 +31,7 @@ pub enum MoveError {
         /// The value of register 29.
         state: u8,
     },
-    /// The arm does not carry out the move, for these reasons. Each tells what to do: [`ProblemKind::remedy`].
+    /// The arm does not carry out the move, for these reasons. [`ProblemKind::remedy`] says what to do.
     ///
     /// [`ProblemKind::remedy`]: crate::health::ProblemKind::remedy
     #[error("{}", sentences(.0))]
@@ -66,10 +66,10 @@ pub enum MoveError {
         /// answered again elsewhere ([D12](protocol_core::decisions#d12)).
         retargeted: u8,
     },
-    /// The arm was told to hold, and has other targets since.
+    /// The arm was ordered to hold, but has got other targets since.
     #[error("the arm does not hold: another program has sent it elsewhere")]
     OtherTargets,
-    /// The arm was told to hold, and something drags joints away from their targets.
+    /// The arm was ordered to hold, but something drags joints away from their targets.
     #[error("the arm does not hold: {}", away_text(away))]
     NotHeld {
         /// Joint, position and target in degrees.

@@ -1,4 +1,4 @@
-//! Makes an arm hold, and watches whether it does.
+//! Makes an arm hold, and watches whether the joints stay.
 //!
 //! ```text
 //!   Arm::hold, or motor state 1 ──▶ Arm::watch_hold: half a second ──▶ Ok, or the reason why a joint does not hold
@@ -16,9 +16,10 @@ use crate::arm::Arm;
 use crate::health::{MoveCheck, Problem, ProblemKind};
 use crate::joints::{JointSnapshot, bits};
 
-/// The arm notices a servo that let go after at most 200 ms (D28), and a silent one sooner.
+/// The arm needs at most 200 ms to notice that a servo has let go (D28), and less to notice that a servo is silent.
 const WATCH_TIME: Duration = Duration::from_millis(500);
-/// The targets may change for this time. A joint that gives way is reported as blocked after a second (D27).
+/// A joint whose target still changes after this time does not hold. The arm reports a joint that gives way as blocked
+/// after a second (D27).
 const LONGEST_WATCH: Duration = Duration::from_millis(2_000);
 const POLL_PERIOD: Duration = Duration::from_millis(50);
 /// A target that the arm itself gives a joint is at most this far from the joint. At this distance the servo pushes with the
@@ -50,7 +51,7 @@ impl Arm {
     ///
     /// # Errors
     /// [`MoveError::MayMove`] if the arm did not take the targets that hold it, or does not answer any more. The errors of
-    /// [`Arm::watch_hold`]. [`MoveError::Problems`] if the controller restarted, which then holds the arm.
+    /// [`Arm::watch_hold`]. [`MoveError::Problems`] if the controller restarted; after its restart it holds the arm.
     pub fn hold_and_watch(&mut self) -> Result<JointSnapshot, MoveError> {
         let (joints, has_restarted) = self.hold_through_restarts()?;
         if joints.is_driven() {
@@ -68,7 +69,8 @@ impl Arm {
     /// Makes the motors drive the joints where they are (motor state 1), and then [`Arm::watch_hold`].
     ///
     /// # Errors
-    /// No servo answers: then nothing is written. Those of [`Arm::write_motion`] and [`Arm::watch_hold`].
+    /// [`MoveError::Problems`] if no servo answers (then nothing is written) or the controller restarted. Also the errors of
+    /// [`Arm::write_motion`] and [`Arm::watch_hold`].
     pub fn engage_and_watch(&mut self) -> Result<(), MoveError> {
         let before = self.joints()?;
         self.some_servo_answers()?;
@@ -98,14 +100,14 @@ impl Arm {
         let longest = self.now() + LONGEST_WATCH;
         loop {
             let joints = self.joints()?;
-            // Check after the read of the joints: a restart changes targets, too, and this names it.
+            // Check after the joints are read. A restart also changes targets, and the check reports it as a restart.
             check.check(self)?;
             let changed: Vec<_> = Joint::ALL
                 .into_iter()
                 .filter(|joint| joints.target(*joint) != begun.target(*joint))
                 .collect();
             if !changed.is_empty() {
-                // A target near its joint was changed by the arm, any other by another program.
+                // The arm itself changes a target only to a value near the joint. Any other change comes from another program.
                 if changed.iter().any(|joint| distance(&joints, *joint) > OWN_TARGET_DEGREES) {
                     return Err(MoveError::OtherTargets);
                 }
@@ -128,7 +130,7 @@ impl Arm {
         self.has_none(ProblemKind::is_alarm)
     }
 
-    /// Fails if the arm has a problem of such a kind.
+    /// Fails if the arm has a problem of a kind for which `is_such` is true.
     fn has_none(&mut self, is_such: fn(ProblemKind) -> bool) -> Result<(), MoveError> {
         let mut problems = self.health()?.problems();
         problems.retain(|problem| is_such(problem.kind));

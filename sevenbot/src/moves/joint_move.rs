@@ -87,7 +87,7 @@ pub struct JointMove {
 }
 
 impl JointMove {
-    /// Sends the targets to all joints at the same time.
+    /// Sends the targets, and verifies that the arm took them. Joints with neighbouring numbers start together.
     ///
     /// # Errors
     /// A joint with a target cannot be driven now: [`MoveError::Problems`], and nothing was sent. Or the arm does not take the
@@ -120,7 +120,7 @@ impl JointMove {
     /// As [`Self::begin_fine`], at this pace. If the arm does not take the move, the speeds and durations stay as they were.
     ///
     /// # Errors
-    /// As [`JointMove::begin`], and those of [`Pace::set`].
+    /// The errors of [`JointMove::begin`] and [`Pace::set`].
     pub fn begin_at_pace(arm: &mut Arm, targets: FineTargets, pace: Pace) -> Result<Self, MoveError> {
         if pace == Pace::default() {
             return Self::begin_fine(arm, targets);
@@ -136,7 +136,8 @@ impl JointMove {
         begun
     }
 
-    /// A move whose targets were sent. A controller that restarted meanwhile has other speeds, so the arm is made to hold.
+    /// Checks the arm after the targets were sent. If the controller restarted meanwhile, its speeds are the defaults: then
+    /// makes the arm hold, and fails.
     fn sent(
         arm: &mut Arm,
         targets: Targets,
@@ -165,8 +166,8 @@ impl JointMove {
     ///
     /// # Errors
     /// A joint with a target is blocked, let go or silent, the supply was lost, or the controller restarted:
-    /// [`MoveError::Problems`]. A joint still moves after twice its duration, or settles away from its target; the observer ends
-    /// the wait; or an exchange failed.
+    /// [`MoveError::Problems`]. A joint still moves 5 s after twice the duration of the move, or settles away from its target;
+    /// the observer ends the wait; or an exchange failed.
     pub fn finish(&self, arm: &mut Arm, observer: &mut dyn Observer) -> Result<[u8; 7], MoveError> {
         let mut check = self.check.clone();
         self.wait_until_still(arm, &mut check, observer)?;
@@ -308,7 +309,7 @@ impl JointMove {
     }
 }
 
-/// Waits for the time between two reads.
+/// Asks the observer whether to go on, and waits for the time between two reads.
 fn pause(arm: &mut Arm, observer: &mut dyn Observer) -> Result<(), MoveError> {
     if !observer.goes_on() {
         return Err(MoveError::Interrupted);

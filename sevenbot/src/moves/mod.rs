@@ -1,4 +1,5 @@
-//! Moves that take a while: to a pose, along a recording, or guided by hand into a recording.
+//! Moves that take a while: to a pose, along a recording, guided by hand into a recording, or into a pose for parking. Also
+//! a watched hold, and writes of registers that may move the arm.
 //!
 //! ```text
 //!   Arm::driven_joints ──▶ JointMove::begin ──▶ finish ──▶ positions        ┐

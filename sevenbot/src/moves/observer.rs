@@ -43,7 +43,8 @@ impl Stage {
 /// assert!(watch.goes_on() && !watch.goes_on());
 /// ```
 pub trait Observer {
-    /// Does the call go on? Asked at least every 50 ms. `false` ends it with [`MoveError::Interrupted`](super::MoveError).
+    /// Does the call go on? Asked between two reads, every 50 ms or more often while the arm answers at once. `false` ends
+    /// the call with [`MoveError::Interrupted`](super::MoveError).
     fn goes_on(&mut self) -> bool {
         true
     }

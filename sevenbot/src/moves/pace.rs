@@ -106,7 +106,7 @@ impl PaceBefore {
         })
     }
 
-    /// Waits until no joint of the move moves. After a move failed at one joint, the others go on.
+    /// Waits until no joint of the move moves. When a move fails at one joint, the other joints go on to their targets.
     ///
     /// # Errors
     /// The observer ended the wait, a joint still moves after 100 s, or an exchange failed.

@@ -34,7 +34,8 @@ const FOREARM_LIMIT_DEGREES: u8 = 120;
 const SPEED_STEPS: u8 = 10;
 /// The arm is watched for this time after it was let go.
 const WATCH_TIME: Duration = Duration::from_secs(2);
-/// The same for a pose of the user. From some poses a damped joint creeps by a degree in 15 s, and by a hundred in a minute.
+/// The same for a pose of the user. From some poses a damped joint creeps by 1 degree in 15 s, and by 100 degrees in a
+/// minute.
 const WATCH_TIME_OF_OWN_POSE: Duration = Duration::from_secs(15);
 /// Joints that were let go have settled after this time.
 const SETTLING_TIME: Duration = Duration::from_secs(5);
@@ -47,7 +48,8 @@ const CREEPS_HUNDREDTHS: u16 = 30;
 /// Why an arm is not parked.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ParkError {
-    /// The move to the pose failed. The motors are as they were.
+    /// The move to the pose failed: the motors are as they were. Or, after the arm was let go, the check failed for another
+    /// reason than a sinking joint.
     #[error(transparent)]
     Move(#[from] MoveError),
     /// The joint sank when it was let go. The motors drive it again, and the arm holds.
@@ -69,9 +71,11 @@ impl From<crate::error::Error> for ParkError {
 }
 
 impl Arm {
-    /// Moves slowly to a pose in which the arm may be let go, lets it go (motor state 0), and checks that it stays: for 2 s in
-    /// [`PARK_POSE`] (`None`), which is right for an arm with an empty gripper, and for 15 s in another pose. Restores the
-    /// speeds and durations before it lets go.
+    /// Moves slowly to a pose, restores the speeds and durations, lets the arm go (motor state 0), and checks that it stays.
+    /// Returns the positions at the end of the check.
+    ///
+    /// `pose`: `None` is [`PARK_POSE`], which is right for an arm with an empty gripper. The check takes 2 s in that pose, and
+    /// 15 s in any other.
     ///
     /// # Errors
     /// The arm does not reach the pose. Or a joint moves by more than 2 degrees when it is let go, or still moves after 5 seconds,
@@ -86,7 +90,8 @@ impl Arm {
         let before = PaceBefore::read(self, &all_joints)?;
         let moved = self.go_to_park_pose(pose, observer);
         if moved.is_err() {
-            // Joints that are on their way would go on at the speeds of before. What does not hold is told by `moved`.
+            // Without a hold, joints on their way would go on at the restored speeds. If the hold fails too, the error of the
+            // move is returned.
             let _ = self.hold_and_watch();
         }
         let restored = before.put_back(self);
@@ -121,7 +126,7 @@ impl Arm {
         let stayed = self.watch_parked(&start, is_own_pose, observer);
         let holds_again = match &stayed {
             Err(ParkError::Sinks { .. } | ParkError::Move(MoveError::Interrupted)) => true,
-            // Of one joint: the others hold what they can.
+            // Problems of single joints: the other joints hold what they can.
             Err(ParkError::Move(MoveError::Problems(problems))) => {
                 problems.iter().all(|problem| problem.joint.is_some())
             }

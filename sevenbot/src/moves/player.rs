@@ -62,7 +62,7 @@ pub struct Player {
     rule: ApproachRule,
     /// The speeds of the joints before the first run.
     speeds: [Speed; 7],
-    /// Speeds and durations, as they are to be put back.
+    /// The speeds and durations to put back after the playback.
     before: Option<PaceBefore>,
     measured: Vec<(Duration, [FineAngle; 7])>,
     played: u32,
@@ -98,7 +98,7 @@ impl Player {
         self.played
     }
 
-    /// Could the speeds and durations not be restored, as on a lost connection? Then the arm keeps those of the recording.
+    /// Could the speeds and durations not be restored, as on a lost connection? Then the arm keeps the values of the playback.
     #[must_use]
     pub const fn has_left_pace(&self) -> bool {
         self.has_left_pace
@@ -110,14 +110,14 @@ impl Player {
         &self.measured
     }
 
-    /// Plays this many times; 0 means until the observer ends it, and the arm then holds. Restores the speeds and times
-    /// that the arm had before. The motors must drive the joints: [`Arm::driven_joints`].
+    /// Plays this many times; 0: until the observer ends the playback. If the observer ends it, the arm holds. Restores the
+    /// speeds and durations that the arm had before. The motors must drive the joints: [`Arm::driven_joints`].
     ///
     /// # Errors
     /// The first pose is too far from where the arm stands or, if `times` is not 1, from the last pose: then nothing is
     /// moved. A joint is blocked, let go or silent, the supply was lost, or the controller restarted:
-    /// [`MoveError::Problems`]. The observer ended it, the arm did not take a value or reach a pose, its reports ended, or an
-    /// exchange failed.
+    /// [`MoveError::Problems`]. The observer ended the playback, this program paused for too long, the arm did not take a value
+    /// or reach a pose, its reports ended, or an exchange failed.
     pub fn play(&mut self, arm: &mut Arm, times: u32, observer: &mut dyn Observer) -> Result<(), MoveError> {
         self.check_start(arm, times)?;
         let Some(first) = self.moments.first() else { return Ok(()) };
@@ -219,7 +219,8 @@ impl Player {
         let options = StreamOptions::new(PERIOD_MS).ok_or(StreamError::NoExtendedBlock)?;
         let mut stream = SetPointStream::open(arm, options)?;
         // The points set the speed, so the registers must not limit it. The recording was checked, and the arm is at its
-        // first pose. The stream is open before, because the next program puts right what an open one left behind.
+        // first pose. The stream is opened first: if this program dies, the next one resets the speeds only if it finds an
+        // abandoned stream.
         let unlimited = stream.arm().write_checked(SPEED.address, &[Speed::MAXIMUM.steps(); 7]);
         if let Err(error) = unlimited {
             return self.end_stream(stream, Err(error.into()));

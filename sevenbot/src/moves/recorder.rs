@@ -17,9 +17,9 @@ const REPORT_TIMEOUT: Duration = Duration::from_secs(3);
 /// A measured pose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RecordedPose {
-    /// Since the first pose.
+    /// The time of the measurement, since the first pose.
     pub time: Duration,
-    /// When it arrived, on the clock of the arm's line.
+    /// When the report arrived, on the clock of the arm's line.
     pub received: Instant,
     /// The angles, joint 1 first.
     pub pose: [FineAngle; 7],

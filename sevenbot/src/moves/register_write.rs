@@ -19,7 +19,8 @@ impl Arm {
     /// - A target of a joint that is driven is a move: it is not written while the joint is silent or has let go, and the arm is
     ///   checked after the write. A whole position of the wrist sets the targets of joints 1 to 3
     ///   ([M7](protocol_core::decisions#m7)).
-    /// - Motor state 1 is not written while no servo answers. A write of it alone is [`Arm::engage_and_watch`].
+    /// - Motor state 1 is not written while no servo answers. If register 29 is the only one, this is
+    ///   [`Arm::engage_and_watch`].
     ///
     /// ```
     /// use sevenbot::moves::MoveError;

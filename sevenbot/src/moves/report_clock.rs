@@ -1,8 +1,8 @@
-//! Computes when the arm measured a report from when the report arrived.
+//! Estimates the time of measurement of each report from the time of its arrival.
 //!
 //! The arm reports without drift (D14), but USB adapters and a busy host deliver late, and several reports at once. So
-//! a report gets the tick after that of the last report. It gets a later tick only if that one is nearer to its arrival:
-//! then reports were lost.
+//! a report gets the tick that follows the previous report's tick. It gets a later tick only if the later one is nearest
+//! to its arrival: then reports were lost.
 
 use std::time::{Duration, Instant};
 
@@ -15,7 +15,6 @@ pub(super) struct ReportClock {
 }
 
 impl ReportClock {
-    /// Ticks with this period.
     pub(super) const fn new(period: Duration) -> Self {
         Self { period, last: None }
     }

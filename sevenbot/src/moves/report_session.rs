@@ -7,8 +7,8 @@ use crate::arm::Arm;
 use crate::error::Error;
 use host_link::Span;
 
-/// How often a write is sent that cannot be confirmed. On a line that loses 3 % of its bytes, at least one of these arrives
-/// 99 times of 100.
+/// How many times an unconfirmed write is sent. On a line that loses 3 % of its bytes, at least one of them arrives in
+/// 99 of 100 cases.
 const BLIND_WRITES: usize = 3;
 
 impl Arm {
@@ -21,7 +21,8 @@ impl Arm {
         Ok(if has_block { report_content::FINE_POSITIONS } else { report_content::POSITIONS })
     }
 
-    /// Runs `work` while the arm sends `hz` reports a second. `content` is the value of register 189 for them.
+    /// Runs `work` while the arm sends `hz` reports a second. `content` is the value of register 189 for them. Restores
+    /// registers 53 and 189 afterwards, also after a failure.
     ///
     /// # Errors
     /// Those of `work`, and of [`Arm::write_checked`].

@@ -1,4 +1,4 @@
-//! Moves of a simulated arm under faults: what is refused, what is told, and what is put back.
+//! Moves of a simulated arm under faults: refusals, error reports, and the values that are put back.
 
 use std::error::Error;
 use std::time::Duration;

@@ -1,4 +1,4 @@
-//! Moves of the tip: what [`crate::cartesian`] needs to know of the arm.
+//! Moves of the tip: reads the state of the arm that [`crate::cartesian`] needs.
 //!
 //! ```text
 //!   TipMove: targets of this arm ──▶ JointPath: from where it stands, at its speeds ──▶ Guard
@@ -30,7 +30,7 @@ pub struct TipMove {
 }
 
 impl TipMove {
-    /// The targets for this arm. `tip` and `tool` are those of `target`.
+    /// The targets for this arm. `tip` and `tool` are the position and the direction for which `target` was computed.
     ///
     /// # Errors
     /// An exchange failed.
@@ -117,7 +117,7 @@ pub enum LineStartError {
 }
 
 impl LineStart {
-    /// The start for this arm, with its joints as just read.
+    /// The start for this arm. `joints` are its joints, read a moment ago.
     ///
     /// # Errors
     /// The target of a joint is unknown, or an exchange failed.

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::{env, fmt};
 
-/// The environment variable with the token of servers that want one.
+/// The environment variable with the token for servers that require one.
 pub const TOKEN_VARIABLE: &str = "SEVENBOT_TOKEN";
 
 /// The environment variable with the path of a PEM file of certificates. The certificate of a server with TLS must be one of
@@ -24,7 +24,7 @@ pub enum Address {
 }
 
 impl Address {
-    /// The address in a port's name; `None` if it names a serial port.
+    /// The address in a port's name; `None` if the port is a serial port or a simulated arm.
     ///
     /// ```
     /// use sevenbot::network::Address;

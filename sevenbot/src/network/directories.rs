@@ -3,7 +3,8 @@
 use std::env;
 use std::path::{Path, PathBuf};
 
-/// Where servers leave their files: `7bot` in `XDG_RUNTIME_DIR`, or else in the state directory. `None` if others can write there.
+/// The directory of the servers' files: `7bot` in `XDG_RUNTIME_DIR`, otherwise in the state directory. `None` if others can
+/// write there.
 pub(super) fn runtime_directory() -> Option<PathBuf> {
     private(absolute("XDG_RUNTIME_DIR").or_else(state_base)?)
 }
@@ -27,7 +28,7 @@ fn private(base: PathBuf) -> Option<PathBuf> {
     is_private(&directory).then_some(directory)
 }
 
-/// Is it a directory that only this user can write to? It is created if it does not exist.
+/// Is this a directory that only this user can write to? Creates it if it does not exist.
 #[cfg(unix)]
 fn is_private(directory: &Path) -> bool {
     use std::fs;

@@ -8,8 +8,9 @@ use std::process;
 
 use super::directories::runtime_directory;
 
-/// The extensions of a server's file and of its socket.
+/// The extension of a server's file.
 const FILE: &str = "server";
+/// The extension of a server's socket.
 const SOCKET: &str = "sock";
 
 /// A server of this user.
@@ -41,7 +42,7 @@ impl LocalServer {
         Some(Self { socket, port: PathBuf::new(), name })
     }
 
-    /// Tells other programs of this user of the server.
+    /// Announces the server to other programs of this user: writes its file.
     ///
     /// # Errors
     /// The file cannot be written.
@@ -66,7 +67,7 @@ impl LocalServer {
         Some(Self { socket: file.with_extension(SOCKET), port, name: value("name").map(str::to_owned) })
     }
 
-    /// Does it accept connections? The file of a server that was killed stays.
+    /// Does the server accept connections? A killed server leaves its file behind.
     #[cfg(unix)]
     fn is_running(&self) -> bool {
         std::os::unix::net::UnixStream::connect(&self.socket).is_ok()
@@ -77,7 +78,7 @@ impl LocalServer {
         false
     }
 
-    /// Its address, in the place of a port's name.
+    /// The address of the server, for use in the place of a port's name.
     #[must_use]
     pub fn address(&self) -> String {
         format!("unix:{}", self.socket.display())
@@ -96,7 +97,7 @@ pub fn servers() -> Vec<LocalServer> {
     found
 }
 
-/// The server of this user that has a port open.
+/// The running server of this user that has this port open; `None` if there is none.
 #[must_use]
 pub fn serving(port: &str) -> Option<LocalServer> {
     let port = fs::canonicalize(port).ok()?;

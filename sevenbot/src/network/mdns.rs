@@ -8,7 +8,7 @@ use mdns_sd::{IfKind, ServiceDaemon, ServiceEvent, ServiceInfo};
 use super::address::Address;
 use super::known_names::KnownName;
 
-/// The type of service.
+/// The service type under which servers announce their arms.
 const SERVICE: &str = "_sevenbot._tcp.local.";
 /// The property of a server with TLS.
 const ENCRYPTED: (&str, &str) = ("tls", "1");
@@ -22,7 +22,7 @@ pub struct Announced {
     pub name: String,
     /// Its address over TCP.
     pub address: SocketAddr,
-    /// The connection has to be encrypted.
+    /// Does the server require TLS?
     pub is_encrypted: bool,
 }
 
@@ -97,7 +97,7 @@ pub fn announced() -> Vec<Announced> {
     found
 }
 
-/// The announced arm of this name; `None` if none answers within a second and a half.
+/// The announced arm of this name; `None` if no arm of this name answers within a second and a half.
 #[must_use]
 pub fn find(name: &str) -> Option<Announced> {
     let mut found = None;

@@ -78,6 +78,7 @@ impl SocketLine {
 }
 
 /// Connects to a server of the local network: at the address that it announces now, or else at its last known address.
+/// Remembers an announced address.
 fn connect_named(name: &str, token: Option<&str>) -> Result<Box<dyn Stream>, OpenError> {
     if let Some(known) = announced(name) {
         let stream = connect_known(&known, token)?;

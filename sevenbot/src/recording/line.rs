@@ -52,7 +52,7 @@ pub enum LineError {
     /// The text is not a time in seconds, up to a day.
     #[error("`{0}` is not a time in seconds, up to a day")]
     Time(String),
-    /// The time is not later than that of the moment before.
+    /// The time is not later than the time of the previous moment.
     #[error("the time {} s is not later than {} s, the one before", time.as_secs_f64(), before.as_secs_f64())]
     NotLater {
         /// The time of this moment.
@@ -111,7 +111,7 @@ pub(super) fn parse(line: &str, version: FileVersion) -> Result<Moment, LineErro
     Ok(Moment { time: seconds(time)?, pose: angles, vacuum: suck(vacuum)? })
 }
 
-/// The moment, if its time can be written.
+/// The moment, if its time is at most a day.
 pub(super) fn checked(moment: Moment) -> Result<Moment, LineError> {
     match moment.time {
         time if time > LONGEST => Err(LineError::Time(time.as_secs_f64().to_string())),

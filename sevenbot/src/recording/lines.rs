@@ -29,7 +29,7 @@ pub struct RecordingLines {
 }
 
 impl RecordingLines {
-    /// Without a moment.
+    /// The lines of a recording that has no moment yet.
     #[must_use]
     pub const fn new(version: FileVersion) -> Self {
         Self { version, last: None, count: 0 }
@@ -56,7 +56,7 @@ impl RecordingLines {
         self.count
     }
 
-    /// The time of the last moment.
+    /// The time of the last moment; 0 if there is none.
     #[must_use]
     pub fn duration(&self) -> Duration {
         self.last.unwrap_or_default()

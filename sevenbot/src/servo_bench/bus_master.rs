@@ -153,7 +153,7 @@ impl BusMaster {
         Err(ServoError::NotTaken { id, register })
     }
 
-    /// Writes registers once, without reading them back.
+    /// Writes registers once, without reading them back. Waits up to 25 ms for the acknowledgement.
     ///
     /// # Errors
     /// The port failed.
@@ -184,7 +184,8 @@ impl BusMaster {
         }))
     }
 
-    /// Counts further answers of this id within `timeout`. One or more means that several servos have the id.
+    /// Counts further answers of this id until no byte arrives for `timeout`. One or more means that several servos have the
+    /// id.
     pub(crate) fn extra_answers(&mut self, id: u8, timeout: Duration) -> Result<usize, ServoError> {
         self.late.clear();
         self.wait_for_silence(timeout)?;
@@ -196,7 +197,7 @@ impl BusMaster {
         std::mem::take(&mut self.late)
     }
 
-    /// The number of damaged frames since the last call.
+    /// The number of damaged frames since the last call, or since the last [`Self::read`] began.
     pub(crate) fn take_damaged(&mut self) -> usize {
         std::mem::take(&mut self.received.damaged_frames)
     }
@@ -277,7 +278,7 @@ impl BusMaster {
     }
 }
 
-/// Is this frame an echo of the request or of an earlier question? No answer with two values is expected.
+/// Is this frame an echo of the request or of an earlier question? A question has two values, and no expected answer has two.
 fn is_echo(frame: &ServoFrame<'_>, request: &[u8]) -> bool {
     if let [_, _, id, _, code, params @ .., _] = request
         && (frame.id, frame.code, frame.params) == (*id, *code, params)

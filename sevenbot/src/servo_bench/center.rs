@@ -21,7 +21,7 @@ const TORQUE_ON: [u8; 1] = [1];
 const TORQUE_OFF: [u8; 1] = [0];
 /// Registers from the present position to the moving flag.
 const MEASURED: u8 = register::MOVING - register::PRESENT_POSITION + 1;
-/// So many consecutive readings above the load limit end the move. One reading may be the start of the motion.
+/// This many consecutive readings above the load limit end the move. A single one may come from the start of the motion.
 const OVERLOAD_READINGS: u32 = 5;
 
 /// Speed and limits of the move.
@@ -61,7 +61,7 @@ pub enum CenterError {
     /// The servo reports a position outside 0 to 1023 counts.
     #[error("the servo reports no position between 0 and 1023 counts")]
     Unmeasured,
-    /// The load was above the limit, or the servo reported an error.
+    /// The load stayed above the limit, or the servo reported overload or heat.
     #[error("stopped at {position} counts: load {} %, errors: {}", f64::from(*load) / 10.0, error_words(*errors))]
     Overload {
         /// The position in counts.

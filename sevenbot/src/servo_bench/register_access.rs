@@ -32,7 +32,7 @@ pub enum SetError {
     /// An id is set by another function, which looks for a second servo with that id. Nothing was sent.
     #[error("an id is set by `set-id`, which checks that no other servo has it")]
     IdNeedsCheck,
-    /// The EEPROM cannot be opened. Nothing else was written.
+    /// The EEPROM cannot be opened. The register was not written.
     #[error("the servo's EEPROM stays locked: {0}")]
     StaysLocked(ServoError),
     /// The value was written, but the EEPROM cannot be locked again.
@@ -72,7 +72,7 @@ pub fn get_all(bus: &mut BusMaster, id: u8) -> Result<Vec<ServoValue>, ServoErro
 /// A new baud rate of the servo becomes the rate of the bus, too.
 ///
 /// # Errors
-/// Each variant of [`SetError`] tells the state of the servo.
+/// See [`SetError`]: each variant says whether the value was written.
 pub fn set(
     bus: &mut BusMaster,
     id: u8,

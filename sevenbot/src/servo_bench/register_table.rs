@@ -7,7 +7,7 @@ use motion_core::servo_bus::frame::{BAUD_RATES, register};
 
 use super::MAX_ID;
 
-/// Where a register is, and who may write it.
+/// Where a register is, and whether it can be written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ServoMemory {
     /// Kept without power, and protected by the lock.
@@ -55,7 +55,7 @@ impl RowSource {
 pub struct ServoRegister {
     /// The name, as in Feetech's table, in lower case with dashes.
     pub name: &'static str,
-    /// The first byte.
+    /// The address of the first byte.
     pub address: u8,
     /// Bytes, 1 or 2; the high byte is first.
     pub width: u8,
@@ -63,7 +63,7 @@ pub struct ServoRegister {
     pub range: (u16, u16),
     /// The unit; empty for a code or a number.
     pub unit: &'static str,
-    /// Where it is.
+    /// Where the register is, and whether it can be written.
     pub memory: ServoMemory,
     /// The bit that is the sign of the value, if it has one.
     pub sign_bit: Option<u8>,

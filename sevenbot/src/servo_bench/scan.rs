@@ -27,7 +27,7 @@ const LATE_ANSWERS: Duration = Duration::from_millis(200);
 pub struct ScanPlan {
     /// Baud rates in the order of the scan.
     pub rates: Vec<u32>,
-    /// Ids.
+    /// The ids to ask at each rate.
     pub ids: RangeInclusive<u8>,
     /// Timeout for each id in the first pass; `None`: what a servo needs at that rate.
     pub wait: Option<Duration>,
@@ -44,7 +44,7 @@ pub struct ScanProgress {
     pub found: usize,
 }
 
-/// An id with answers.
+/// An id at which something answered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FoundServo {
     /// The baud rate.
@@ -107,7 +107,8 @@ impl ScanPlan {
     }
 }
 
-/// Scans the bus. Calls `on_progress` after each question.
+/// Scans the bus. Calls `on_progress` after each question of the first pass, and after each rate. The bus keeps the last rate
+/// that the adapter supports.
 ///
 /// # Errors
 /// The port failed.

@@ -15,10 +15,11 @@ const ORDERS: u8 = register::LOCK - register::TORQUE_SWITCH + 1;
 /// Registers from the present position to the moving flag.
 const MEASURED: u8 = register::MOVING - register::PRESENT_POSITION + 1;
 
-/// The registers of one servo. Fields of a single register are named as in Feetech's memory table.
+/// Versions, settings, commands and measurements of one servo. A field that holds one register has its name in Feetech's
+/// memory table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ServoInfo {
-    /// The id.
+    /// The id on the servo bus.
     pub id: u8,
     /// Major and minor version of the firmware: 0.0 if the servo's table does not define it.
     pub firmware_version: (u8, u8),
@@ -48,7 +49,7 @@ pub struct ServoInfo {
     pub is_unlocked: bool,
     /// The measurements; `None` if the position is outside 0 to 1023 counts.
     pub reading: Option<Reading>,
-    /// The error bits.
+    /// The error bits of the status register and of the answer that held it.
     pub errors: u8,
     /// Does the servo move?
     pub is_moving: bool,

@@ -8,20 +8,21 @@ use super::bus_master::BusMaster;
 use super::error::ServoError;
 use super::scan::{AnswerQuality, FoundServo, ScanPlan, ScanProgress, scan};
 
-/// Register 48, the lock of the EEPROM.
+/// The value of register 48 that opens the EEPROM.
 const OPEN: [u8; 1] = [0];
+/// The value of register 48 that locks the EEPROM.
 const LOCKED: [u8; 1] = [1];
 
 /// Why a servo does not have its new id.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SetIdError {
-    /// None or several servos answer. Nothing was written.
+    /// No servo answers, several do, or the only one has another id or gives damaged answers. Nothing was written.
     #[error("{}", not_alone(answering))]
     NotAlone {
         /// The ids that answer.
         answering: Vec<FoundServo>,
     },
-    /// The EEPROM cannot be unlocked. Nothing else was written.
+    /// The EEPROM cannot be unlocked. The id was not written.
     #[error("the servo's EEPROM stays locked: {0}")]
     StaysLocked(ServoError),
     /// The servo still answers to the old id.
@@ -66,7 +67,7 @@ fn id_text(found: &FoundServo) -> String {
 /// Changes the id of the only servo on the bus from `old` to `new`, and verifies it.
 ///
 /// # Errors
-/// Each variant of [`SetIdError`] tells the state of the servo.
+/// See [`SetIdError`]: each variant says which id the servo has, as far as known.
 pub fn set_id(
     bus: &mut BusMaster,
     plan: &ScanPlan,

@@ -114,7 +114,7 @@ impl SimulatedArms {
     /// Sends each arm its seven targets in degrees as the next point of a stream of this period. No time passes.
     ///
     /// # Errors
-    /// As of [`Self::step`].
+    /// As [`Self::step`].
     pub fn send<T: Number>(&mut self, targets: &[T], period: Duration) -> Result<(), StepError> {
         let milliseconds = milliseconds(period).ok_or(StepError::Time(period))?;
         self.check(targets)?;
@@ -222,7 +222,8 @@ impl SimulatedArms {
         self.arms.get_mut(arm).into_iter().for_each(|arm| arm.seed = seed);
     }
 
-    /// Writes registers of the arms of the mask, or of all, in one frame each. An arm refuses what is out of range.
+    /// Writes registers of the arms of the mask, or of all, in one frame each. An arm refuses a frame with a value out of range
+    /// (D16), without an error here.
     pub fn write(&mut self, mask: Option<&[bool]>, address: u8, values: &[u8]) {
         masked(&mut self.arms, mask).for_each(|(_, arm)| arm.write(address, values));
     }

@@ -16,7 +16,7 @@ pub const VELOCITIES: Range<usize> = 7..14;
 pub const LOADS: Range<usize> = 14..21;
 /// The tip in millimetres, x, y, z, by the measured positions; NaN if a joint was not measured.
 pub const TIP: Range<usize> = 21..24;
-/// 1 for a joint that an obstacle keeps from its target, or else 0.
+/// 1 for a joint that an obstacle keeps from its target, otherwise 0.
 pub const BLOCKED: Range<usize> = 24..31;
 /// Seconds since the last reply: 0 if the read of the last step was answered.
 pub const AGE: Range<usize> = 31..32;

@@ -18,12 +18,12 @@ pub const MEASURED: usize = 3 * JOINTS;
 pub const WANTED: usize = 3 * JOINTS;
 /// The angles that the servos' control aims at, in degrees.
 pub const SET_POINTS: Range<usize> = 0..7;
-/// Their velocities in degrees per second.
+/// The velocities of the set-points, in degrees per second.
 pub const SET_VELOCITIES: Range<usize> = 7..14;
-/// 1: the motor drives its joint; 2: it damps it; 0: it does neither.
+/// 1: the motor drives the joint. 2: the motor damps the joint. 0: neither.
 pub const DRIVES: Range<usize> = 14..21;
 
-/// Fails at the first measurement that is not a number or too large, of a joint whose position is not NaN.
+/// Fails at the first measurement that is not a number or too large. Ignores joints whose position is NaN.
 pub(super) fn check<T: Number>(measured: &[T]) -> Result<(), StepError> {
     for (arm, row) in measured.chunks(MEASURED).enumerate() {
         for joint in 1..=JOINTS {
@@ -47,7 +47,7 @@ const fn is_inside([position, ..]: [f64; 3]) -> bool {
     position.is_nan()
 }
 
-/// Gives the arm the measurements, lets time pass, and writes what the servos aim at.
+/// Gives the arm the measurements, lets time pass, and writes [`WANTED`] numbers.
 pub(super) fn exchange<T: Number, N: Number>(
     arm: &mut Simulation,
     measured: &[T],

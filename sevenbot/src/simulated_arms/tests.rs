@@ -1,4 +1,5 @@
-//! The same steps give the same numbers on any number of threads, and as frames on a single arm.
+//! Arms that step together: the same numbers on any number of threads and as frames on a single arm, wrong calls, resets, and
+//! lost replies.
 
 use arm_sim::request::Request;
 use protocol_core::registers::map::{FINE_POSITION, FINE_TARGET, SET_POINT_PERIOD};
@@ -13,7 +14,7 @@ fn arms(count: u64, threads: usize) -> SimulatedArms {
     SimulatedArms::new(&seeds, NonZeroUsize::new(threads).expect("threads"))
 }
 
-/// Targets round the pose of rest. Those of an arm and a step are always the same.
+/// Targets near the pose of rest, which depend only on the arm and the step.
 fn targets(arm: usize, step: usize) -> [f64; JOINTS] {
     let turn = |joint: usize| f64::from(u8::try_from((arm * 7 + step * 3 + joint * 5) % 11).expect("small"));
     std::array::from_fn(|joint| REST[joint] + turn(joint) - 6.0)

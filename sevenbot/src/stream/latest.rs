@@ -33,7 +33,7 @@ pub struct LatestCounts {
     pub repeated: u32,
     /// Points that were due and not sent, because the sender was late.
     pub missed: u32,
-    /// How often the program was silent until the watchdog of the arm acted.
+    /// How many times the program was silent for so long that the watchdog of the arm acted.
     pub watchdog: u32,
 }
 
@@ -158,12 +158,12 @@ impl LatestPoints {
         self.leading.as_ref().is_some_and(|leading| leading.is_new)
     }
 
-    /// Makes the next point due at `now`, after the sender did something else.
+    /// Makes the next point due at `now`, for a sender that was busy with another task.
     pub fn restart(&mut self, now: Duration) {
         self.leading.iter_mut().for_each(|leading| leading.pace.restart(now));
     }
 
-    /// The watchdog of the arm has acted.
+    /// Counts that the watchdog of the arm has acted.
     pub const fn watchdog_acted(&mut self) {
         self.counts.watchdog += 1;
     }

@@ -57,7 +57,7 @@ impl StreamPace {
         Self { start, period, next: 0, last_taken: None, counts: PaceCounts::default() }
     }
 
-    /// When the first point was due, or the next one after the last pause.
+    /// When the first point was due, or since [`Self::restart`] the first one after the pause.
     #[must_use]
     pub const fn start(&self) -> Duration {
         self.start
@@ -69,8 +69,8 @@ impl StreamPace {
         self.start + self.period.saturating_mul(self.next)
     }
 
-    /// The number of the point to send at `now`: the next one, or a later one if that is due already. The arm would pass
-    /// over the earlier ones (D23).
+    /// The number of the point to send at `now`: the next one, or the latest one that is due. The arm would pass over the
+    /// earlier ones (D23).
     #[must_use]
     pub fn number_at(&self, now: Duration) -> u32 {
         let lateness = now.saturating_sub(self.due());
@@ -78,7 +78,7 @@ impl StreamPace {
         self.next.saturating_add(u32::try_from(passed).unwrap_or(u32::MAX))
     }
 
-    /// Takes the point to send at `now`: its number, as [`Self::number_at`] gives it.
+    /// Takes the point to send at `now`, and counts its lateness. Returns its number, as [`Self::number_at`].
     pub fn take(&mut self, now: Duration) -> u32 {
         let number = self.number_at(now);
         let passed = number.saturating_sub(self.next);

@@ -163,7 +163,7 @@ fn a_wait_tells_that_a_joint_got_another_target() {
     }
 }
 
-/// Checks until the stream tells a problem.
+/// Checks the stream until a check fails. Returns the error.
 fn wait_for_problem(stream: &mut SetPointStream<'_>) -> MoveCheckError {
     let deadline = Instant::now() + Duration::from_secs(30);
     loop {

@@ -1,4 +1,5 @@
-//! Verified stops and writes on a line that loses, damages or delays one frame.
+//! Stops, writes and reads on a line that loses, damages or delays a frame, between reports, and with an arm that takes no
+//! writes.
 
 #![cfg(unix)]
 
@@ -14,7 +15,7 @@ use sevenbot::hold::HoldError;
 use sevenbot::moves::MoveError;
 use sevenbot::{Arm, ArmOptions, Error};
 
-/// Each lost frame costs one timeout. The many attempts allow a busy machine ten seconds.
+/// 50 attempts of 200 ms give a busy machine ten seconds for a reply.
 const OPTIONS: ArmOptions =
     ArmOptions { baud: 115_200, reply_timeout: Duration::from_millis(200), attempts: 50, map: None };
 
@@ -72,7 +73,7 @@ fn a_late_reply_is_not_the_reply_to_the_next_read_of_the_same_registers() {
             1 => reply(0, &IDENTITY),
             // The first attempt gets no reply in time.
             2 => Vec::new(),
-            // The reply to the first attempt arrives during the second, and that of the second during the next read.
+            // The reply to the first attempt arrives during the second, and the reply to the second during the next read.
             3 => reply(10, &[1; 4]),
             4 => [reply(10, &[2; 5]), values(3)].concat(),
             _ => panic!("a read too many"),

@@ -29,7 +29,7 @@ fn options() -> StreamOptions {
 
 /// The registers from the set-point period to the action of the watchdog, after all writes so far.
 fn stream_registers(arm: &mut Arm, registers: &Registers) -> [u8; 4] {
-    // The reply comes after the writes before it.
+    // The arm replies after it has carried out the earlier writes.
     arm.read(0, 1).unwrap();
     registers.lock().unwrap()[184..188].try_into().unwrap()
 }
@@ -130,7 +130,7 @@ fn the_period_of_another_program_is_put_back_after_a_failure() {
     assert_eq!(shown.lock().unwrap()[184..186], [20, 0]);
 }
 
-/// The write before which the other program ends its stream: that of the stop, or that of the restored period.
+/// When the other program ends its stream: never, before the stop writes its targets, or before the stop restores the period.
 #[derive(Clone, Copy)]
 enum StreamEnd {
     Never,

@@ -8,7 +8,7 @@ use crate::units::{MoveTime, Speed};
 /// The largest turn of a joint between two poses, in degrees.
 const STEP_DEGREES: f64 = 0.1;
 
-/// Joints 1 to 5 on their way.
+/// A movement of joints 1 to 5 from one pose to another, each at a constant speed.
 ///
 /// ```
 /// use sevenbot::cartesian::JointPath;
@@ -32,7 +32,7 @@ impl JointPath {
         Self { from, to, seconds: [1.0; 5] }
     }
 
-    /// A way at the speeds and with the durations of the registers.
+    /// A way with these values of the speed and time registers. A time applies only at the maximum speed (D11).
     #[must_use]
     pub fn at_pace(from: [f64; 5], to: [f64; 5], speeds: [Speed; 5], times: [MoveTime; 5]) -> Self {
         let mut seconds = [0.0; 5];

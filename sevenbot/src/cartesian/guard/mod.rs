@@ -6,7 +6,8 @@
 //!   Recording ───▶ Guard::check_recording ──▶ TimedBreach: the first one
 //! ```
 //!
-//! [`kinematics::workspace`] knows the geometry. A suction cup or a claw is not part of it: raise the table by its length.
+//! [`kinematics::workspace`] holds the geometry. It does not include a suction cup or a claw: for these, raise the table by
+//! their length.
 
 use std::fmt;
 use std::time::Duration;
@@ -61,7 +62,7 @@ impl Guard {
 
     /// Is the arm outside every obstacle at these angles of joints 1 to 5, with no allowance for rounded targets?
     pub(super) fn is_clear(&self, angles: [f64; 5]) -> bool {
-        // A millionth of a millimetre is the rounding of the arithmetic.
+        // A depth of less than a millionth of a millimetre is a rounding error of the arithmetic.
         self.depth(angles).depth_mm < 1e-6
     }
 
@@ -74,7 +75,7 @@ impl Guard {
     /// A way that begins inside an obstacle may leave it, but go no deeper.
     ///
     /// # Errors
-    /// The deepest place of the way that breaks the guard.
+    /// The way breaks the guard. The error is its deepest place.
     pub fn check_path(&self, path: &JointPath) -> Result<(), PathBreach> {
         let mut escape = Escape::default();
         let mut deepest: Option<PathBreach> = None;
@@ -131,7 +132,7 @@ impl Escape {
 /// A part of the arm inside an obstacle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Breach {
-    /// The part.
+    /// The part of the arm that is inside the obstacle.
     pub part: Part,
     /// The obstacle.
     pub obstacle: Obstacle,
@@ -190,7 +191,7 @@ impl fmt::Display for PathBreach {
 
 impl std::error::Error for PathBreach {}
 
-/// The first place of a recording inside an obstacle.
+/// The first place where a recording takes the arm into an obstacle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TimedBreach {
     /// The time of the moment at this place, or of the next moment if the place is between two.

@@ -26,7 +26,7 @@ impl Random {
         low + (high - low) * share
     }
 
-    /// A pose within the limits with its tip not far above the table.
+    /// A pose within the limits, with the tip lower than z = 60 mm.
     fn pose(&mut self) -> [f64; 5] {
         loop {
             let pose = [
@@ -45,8 +45,7 @@ impl Random {
     }
 }
 
-/// The named points of the arm, without the geometry of the guard: elbow, wrist, tip, and the disc's edge at 24 angles of
-/// joint 6.
+/// Points of the arm, computed without the guard's code: elbow, wrist, tip, and the disc's edge at 24 angles of joint 6.
 fn points([t1, t2, t3, t4, t5]: [f64; 5]) -> Vec<Vector> {
     let frames = |t6: f64| forward([t1, t2, t3, t4, t5, t6]);
     let Frames { arm, hand } = frames(90.0);

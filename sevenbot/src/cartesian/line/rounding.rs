@@ -15,7 +15,7 @@ use crate::units::Angle;
 /// Angles of joints 1 to 5, in degrees.
 pub(super) type Angles = [f64; 5];
 
-/// The resolution of the targets. It sets the time between them, too.
+/// The resolution of the targets, which also sets the time between them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TargetResolution {
     /// Whole degrees, for playback with speeds.
@@ -35,7 +35,7 @@ impl TargetResolution {
     }
 }
 
-/// How angles are rounded.
+/// The resolution of rounded angles, and the guard that they should keep to.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Rounding {
     pub(super) resolution: TargetResolution,
@@ -59,7 +59,7 @@ impl Rounding {
         PlannedPose::of(targets, path, share)
     }
 
-    /// The targets at the end of the line. In whole degrees, these are the ones with the smallest miss.
+    /// The targets at the end of the line. Whole degrees are those with the smallest miss: [`Self::best_degrees`].
     pub(super) fn last_pose(&self, angles: Angles, path: &TipPath) -> PlannedPose {
         match self.resolution {
             TargetResolution::Degrees => PlannedPose::of(self.best_degrees(angles, path, 1.0), path, 1.0),
@@ -67,7 +67,8 @@ impl Rounding {
         }
     }
 
-    /// The nearest whole degrees, if they are within the limits of the arm and the guard allows them; otherwise the best ones.
+    /// The nearest whole degrees, if they are within the limits of the arm and the guard allows them; otherwise
+    /// [`Self::best_degrees`].
     fn nearest_degrees(&self, angles: Angles, path: &TipPath, share: f64) -> [FineAngle; 5] {
         let whole = angles.map(f64::round);
         let [t1, t2, t3, t4, t5] = whole;
@@ -78,7 +79,7 @@ impl Rounding {
         self.best_degrees(angles, path, share)
     }
 
-    /// The nearest hundredths; whole degrees if the hundredths would break a limit of the arm.
+    /// The nearest hundredths; [`Self::best_degrees`] if the hundredths would break a limit of the arm.
     fn nearest_hundredths(&self, angles: Angles, path: &TipPath, share: f64) -> [FineAngle; 5] {
         let fine = angles.map(in_range);
         let [t1, t2, t3, t4, t5] = fine.map(FineAngle::degrees);
@@ -86,7 +87,8 @@ impl Rounding {
         if is_legal { fine } else { self.best_degrees(angles, path, share) }
     }
 
-    /// The whole degrees within the limits that are nearest to the path. Those that the guard allows are preferred.
+    /// Of the whole degrees beside `angles` and within the limits, those nearest to the path. Prefers degrees that the guard
+    /// allows.
     fn best_degrees(&self, angles: Angles, path: &TipPath, share: f64) -> [FineAngle; 5] {
         let (tip, tool) = path.at(share);
         let target = TipTarget::near(angles, tip, tool, self.guard.as_ref());

@@ -79,7 +79,7 @@ pub(crate) struct SimulatedWire {
     now: Duration,
     /// The servos are simulated up to this time.
     simulated: Duration,
-    /// Bytes and their time of arrival, in this order.
+    /// Bytes and their times of arrival, in the order of arrival.
     in_transit: VecDeque<(Duration, Vec<u8>)>,
     /// All frames sent.
     pub(crate) sent: Vec<Vec<u8>>,

@@ -111,7 +111,7 @@ pub(crate) fn moving_registers() -> Arc<Mutex<[u8; 256]>> {
     Arc::new(Mutex::new(registers))
 }
 
-/// Carries out a request and returns the reply.
+/// Carries out a request and returns the reply. A write ends all motion.
 pub(crate) fn execute(registers: &mut [u8; 256], request: &Request<'_>) -> Vec<u8> {
     match *request {
         Request::Read { address, count } => {
