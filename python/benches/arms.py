@@ -1,6 +1,6 @@
-"""Steps of 20 ms a second of many simulated arms: `python python/benches/arms.py` prints the table of docs/simulation.md.
+"""Steps of 20 ms that simulated arms make in a second: `python python/benches/arms.py` prints the table of docs/simulation.md.
 
-With the package `mujoco` and the file of `sevenbot model --format mjcf --out arm.xml`, given as the argument, beside MuJoCo.
+With a file of `sevenbot model --format mjcf --out arm.xml` as the argument, and the package `mujoco`, it also measures MuJoCo.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ SECONDS = 3.0
 
 
 def rate(step: Callable[[int], None], arms: int) -> tuple[float, float]:
-    """Arm-steps a second of the clock, and a second of the processor."""
+    """Arm-steps per second of wall-clock time, and per second of processor time."""
     step(0)
     start, used, steps = time.perf_counter(), time.process_time(), 0
     while time.perf_counter() - start < SECONDS:
@@ -29,7 +29,7 @@ def rate(step: Callable[[int], None], arms: int) -> tuple[float, float]:
 
 
 def without_frames(count: int, threads: int) -> tuple[float, float]:
-    """The same motion with a point each second, and without reads: what is left is the time of the arms alone."""
+    """The same motion with one point per second and without reads, to measure the arms without frames."""
     arms = sevenbot.SimulatedArms(count, threads=threads)
     actions, inside, wanted = np.tile(REST, (count, 1)), np.full((count, 21), np.nan), np.empty((count, 21))
 
@@ -55,7 +55,7 @@ def ours(count: int, threads: int) -> tuple[float, float]:
 
 
 def mujoco_alone(model_file: str) -> tuple[float, float]:
-    """One arm in MuJoCo, as many of its steps as 20 ms need."""
+    """One arm in MuJoCo. A step of 20 ms consists of as many of MuJoCo's own timesteps as needed."""
     import mujoco  # type: ignore[import-untyped,unused-ignore]
 
     model = mujoco.MjModel.from_xml_path(model_file)

@@ -4,7 +4,7 @@
     python python/benches/gil.py /tmp/arm
 
 `in the thread` reads in `Arm.sample`, without Python between two reads. `one call each` reads in a Python loop. Each
-figure is the median of runs in turn, and the spread of the kept rates is that from the worst to the best run.
+figure is a median of several runs. In brackets is the range from the worst to the best run.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ import sevenbot
 
 READS = 600
 RUNS = 9
-# CPython's default, and a shorter one, in seconds.
+# Switch intervals of the interpreter, in seconds: CPython's default, and a shorter one.
 INTERVALS = (0.005, 0.0001)
 
 
@@ -57,7 +57,7 @@ def alone(work: Callable[[], None]) -> float:
 
 
 def shown(rates: list[float]) -> str:
-    """Rates of one run each, as parts of the rate alone."""
+    """The median and the range of rates, as text. Each rate is a part of the rate without the other thread."""
     return f"{statistics.median(rates):.0%} ({min(rates):.0%} to {max(rates):.0%})"
 
 

@@ -69,7 +69,7 @@ class MujocoArm:
         driven = wanted[arms.DRIVES][:JOINTS] == 1
         self.model.actuator_gainprm[self.actuators, 0] = self.gains * driven
         self.model.actuator_biasprm[self.actuators, 1:3] = self.biases * driven[:, None]
-        # The derivative term acts on the error, so it leads the set-point by this time.
+        # The servo's derivative term acts on the error, MuJoCo's on the velocity alone. This lead time makes them equal.
         lead = self.biases[:, 1] / self.biases[:, 0]
         aim = (set_points - REST)[:JOINTS] + lead * velocities[:JOINTS]
         self.data.ctrl[self.actuators] = np.radians(aim)

@@ -27,7 +27,7 @@ HIDDEN = 24
 SIGMA = 0.05
 """The size of a random step of a weight."""
 RATE = 0.03
-"""Of learning."""
+"""The learning rate."""
 # What the policy sees of an observation: joints 1 to 5, their velocities, and the way to the goal.
 INPUTS = [0, 1, 2, 3, 4, 7, 8, 9, 10, 11, 24, 25, 26]
 SHAPES = [(len(INPUTS) + 1, HIDDEN), (HIDDEN + 1, sevenbot.gym.JOINTS)]
@@ -59,7 +59,7 @@ def run(
 
 
 def environments(count: int, *, disturbed: bool = False, threads: int | None = None) -> sevenbot.gym.ReachVectorEnv:
-    """Arms that learn to reach."""
+    """The vector environment with `count` arms."""
     envs = gymnasium.make_vec(
         "sevenbot/Reach-v0",
         num_envs=count,
@@ -75,7 +75,7 @@ class Evolution:
     """The policy, and the steps that are tried in this generation."""
 
     def __init__(self, seed: int) -> None:
-        """A policy that does little."""
+        """Starts with small random weights."""
         self.random = np.random.default_rng(seed)
         self.policy: Array = (self.random.standard_normal(SIZE) * 0.1).astype(np.float32)
         self.noise: Array = np.zeros((PAIRS, SIZE), dtype=np.float32)

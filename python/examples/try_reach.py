@@ -3,8 +3,8 @@
     python python/examples/try_reach.py reach_policy.npy --port /dev/ttyUSB0
     cargo xtask emulate --link ./7bot                # in another terminal, and then --port ./7bot
 
-For each goal the arm starts in the pose of rest. Then the policy reads the arm and sends an action each 20 ms, for 1.5 s. A
-guard is not there: keep clear of the arm, and keep its surroundings free. Without a port the arm is simulated.
+For each goal the arm starts in the pose of rest. Then the policy reads the arm and sends an action each 20 ms, for 1.5 s. The
+guard is off: keep clear of the arm, and keep its surroundings free. Without a port the arm is simulated.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def tip_of(observed: sevenbot.Observation) -> Array:
 
 
 def observation(observed: sevenbot.Observation, goal: Array) -> Array:
-    """What the environment for Gymnasium would give."""
+    """The observation, in the form of the environment for Gymnasium."""
     tip = tip_of(observed)
     numbers = np.concatenate([observed.positions, observed.velocities, observed.loads, tip]) / SIZES
     return np.concatenate([numbers, (goal - tip) / 100, [0]]).astype(np.float32)

@@ -58,7 +58,7 @@ class Arm:
             # The thread ends when the arm is closed.
             raise sevenbot.Closed("the arm is closed") from error
         future = asyncio.wrap_future(call)
-        # The result of a cancelled call is not used.
+        # Fetch the exception of a cancelled call, so that asyncio does not report it as never retrieved.
         future.add_done_callback(lambda done: done.cancelled() or done.exception())
         try:
             return await asyncio.shield(future)
@@ -207,7 +207,7 @@ class Stream:
         try:
             await self._arm._call(self.sync.__enter__)
         except asyncio.CancelledError as cancelled:
-            # It may have been opened before the cancellation reached the thread.
+            # The stream may have been opened before the cancellation reached the thread.
             with contextlib.suppress(sevenbot.Closed):
                 await asyncio.to_thread(self.sync.__exit__, type(cancelled), cancelled, None)
             raise

@@ -42,7 +42,7 @@ DT = 0.02
 NEAR_MM = 10.0
 """A tip within this distance of its goal has reached it."""
 MOST_DELAY = 3
-"""Of actions, in steps."""
+"""The longest delay of an action, in steps."""
 FAULTS = (
     "line=corruption=0.05%",
     "line=loss=0.1%",
@@ -97,7 +97,7 @@ class _Arms:
         return drawn
 
     def step(self, actions: Floats) -> tuple[Floats, Flags]:
-        """Rewards, and which tips are near their goals."""
+        """Moves all arms by a step. Returns their rewards, and which tips are near their goals."""
         # A wrong action would stay in the targets, also after the step that fails.
         if not np.isfinite(actions).all():
             raise InvalidValue("an action is not finite: NaN or an infinity")
@@ -130,7 +130,7 @@ class _Arms:
         return goals
 
     def observations(self) -> Floats:
-        """Positions, velocities, loads, tip; from the tip to the goal; the age."""
+        """Positions, velocities, loads, tip; the way from tip to goal; the age; the way of a moving goal in 5 steps."""
         # A joint that was not measured yet reads as 0.
         seen = np.nan_to_num(self.seen)
         way = (self.goals() - self.tips()) / 100

@@ -138,7 +138,7 @@ pub(crate) enum LinePace {
     Within(f64),
 }
 
-/// Speeds of the tip on a straight line, in mm/s.
+/// The allowed speeds of the tip on a straight line, in mm/s.
 pub(crate) const LINE_SPEEDS: std::ops::RangeInclusive<f64> = 1.0..=500.0;
 /// Speed of the tip if none is given, in mm/s.
 const DEFAULT_LINE_SPEED: f64 = 50.0;
@@ -167,7 +167,7 @@ pub(crate) fn guard(py: Python<'_>, table: Option<f64>, guard: bool) -> PyResult
     }
 }
 
-/// The rule for the way to a first point: `approach` is its time in seconds.
+/// The rule for the way to a first point: it takes `seconds`. With `None` the first point has to be near.
 pub(crate) fn approach(py: Python<'_>, seconds: Option<f64>) -> PyResult<ApproachRule> {
     match seconds {
         None => Ok(ApproachRule::Near),

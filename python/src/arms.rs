@@ -22,7 +22,7 @@ use crate::numbers::{Values, duration};
 use crate::simulation::{self, SimulationSnapshot, fault_location, fault_time};
 use crate::worker::lock;
 
-/// Weights in the gripper.
+/// The allowed loads at the tip, in grams.
 const GRAMS: std::ops::RangeInclusive<f64> = 0.0..=HEAVIEST_LOAD_G as f64;
 /// The most arms.
 const MOST_ARMS: i64 = 1_000_000;
@@ -64,7 +64,7 @@ impl SimulatedArms {
         self.process != std::process::id()
     }
 
-    /// A step with arrays of one type.
+    /// The method `step` for arrays with elements of type `N`.
     fn step_as<'py, N: Number + Element>(
         &self,
         py: Python<'py>,
@@ -81,7 +81,7 @@ impl SimulatedArms {
         Ok(seen)
     }
 
-    /// Fills `out`, or a new array of so many columns.
+    /// Fills and returns `out`, or a new array, with a row for each arm and this number of columns.
     fn fill<'py, N: Number + Element>(
         &self,
         py: Python<'py>,
@@ -148,7 +148,7 @@ impl SimulatedArms {
         let threads = threads.and_then(NonZeroUsize::new).or_else(|| available_parallelism().ok());
         let threads = threads.unwrap_or(NonZeroUsize::MIN);
         let seeds = arrays::seeds(count, seed, seeds)?;
-        // The process would be aborted later.
+        // Fail now: if the memory ran out later, the process would be aborted.
         let has_memory = Vec::<u8>::new().try_reserve_exact(count.saturating_mul(ARM_BYTES)).is_ok();
         if !has_memory {
             return Err(PyMemoryError::new_err(format!("there is not enough memory for {count} arms")));
@@ -395,7 +395,7 @@ impl Drop for SimulatedArms {
     }
 }
 
-/// Columns of an array of observations.
+/// Columns of an array, which Python sees as a slice.
 struct Columns(std::ops::Range<usize>);
 
 impl<'py> IntoPyObject<'py> for Columns {

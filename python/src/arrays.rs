@@ -64,7 +64,7 @@ pub(crate) fn out<'py, T: Element>(
     if array.shape() == shape { Ok(array.clone()) } else { Err(wrong_shape(array, shape, "out")) }
 }
 
-/// The array `out` while it is written.
+/// Borrows the array `out` for writing. Fails if it is read-only or in use.
 pub(crate) fn writing<'py, T: Element>(
     array: &Bound<'py, PyArray2<T>>,
 ) -> PyResult<PyReadwriteArray2<'py, T>> {
@@ -127,7 +127,7 @@ pub(crate) fn seeds(
     Ok((0..count).zip(0_u64..).map(|(_, number)| first.wrapping_add(number)).collect())
 }
 
-/// Converts a number within the range to steps; `steps` is how many there are for each unit.
+/// Converts a number to the nearest whole number of steps; a unit has `steps` of them. Fails if the number is out of range.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within the range")]
 pub(crate) fn steps(
     py: Python<'_>,

@@ -21,7 +21,7 @@ struct Slot {
     /// The counts of the sender.
     counts: LatestCounts,
     failed: Option<MoveError>,
-    /// The last angle of each joint in degrees.
+    /// The last angle that the program offered for each joint, in degrees.
     pose: [f64; 7],
 }
 
@@ -43,12 +43,12 @@ impl LatestSlot {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// A stream begins at this pose.
+    /// Opens the slot for a stream that begins at this pose. Drops actions, counts and failures of an earlier stream.
     pub(crate) fn open(&self, pose: [f64; 7]) {
         *self.slot() = Slot { is_open: true, pose, ..Slot::default() };
     }
 
-    /// The stream has ended. Its counts stay.
+    /// Closes the slot at the end of a stream. The counts stay.
     pub(crate) fn close(&self) {
         self.slot().is_open = false;
     }
@@ -102,7 +102,7 @@ impl LatestSlot {
         self.slot().failed.take()
     }
 
-    /// How the actions became points so far.
+    /// The counts of the sender so far.
     pub(crate) fn counts(&self) -> LatestCounts {
         self.slot().counts()
     }

@@ -1,10 +1,11 @@
-//! Sends the points of a program that does not wait for each of them: it keeps the period in the thread of the port.
+//! Sends the points of a program that does not wait for each of them. The thread of the port keeps the period.
 //!
 //! ```text
 //!   Python: latest(action) ──▶ LatestSlot ──▶ LatestPoints: which point is due ──▶ SetPointStream
 //! ```
 //!
-//! Behind a real line it wakes up when a point is due. An arm in virtual time sends what is due while its time passes.
+//! With a real line, the thread wakes up when a point is due. With an arm in virtual time, it sends due points in the calls
+//! that let time pass.
 
 use std::sync::atomic::Ordering;
 use std::time::Duration;
@@ -117,7 +118,7 @@ impl PacedStream<'_> {
         Ok(())
     }
 
-    /// Waits on the clock of the arm's line, and sends what is due meanwhile.
+    /// Waits on the clock of the arm's line, and sends what is due meanwhile. If the caller ends the wait, the arm holds.
     pub(crate) fn sleep(&mut self, time: Duration, watch: &mut Watch<'_>) -> Result<(), MoveError> {
         let end = self.elapsed() + time;
         loop {
@@ -149,7 +150,7 @@ impl PacedStream<'_> {
     }
 }
 
-/// Is a joint further from the point than a first point may be?
+/// Does an angle of a joint in `newer` differ from `point` by more than [`NEAR_DEGREES`]?
 fn is_far(newer: &FineTargets, point: &FineTargets) -> bool {
     let both = newer.iter().zip(point).filter_map(|(newer, point)| newer.zip(*point));
     both.map(|(newer, point)| (newer.degrees() - point.degrees()).abs()).any(|way| way > NEAR_DEGREES)

@@ -25,7 +25,7 @@ const SLEEP_PERIOD: Duration = Duration::from_millis(20);
 /// On a shorter line the tip counts as not moving, in millimetres.
 const SHORTEST_LINE: f64 = 0.5;
 
-/// Where the tip shall go.
+/// The requested tip and direction of the tool, and the guard; `None`: no guard.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TipWish {
     pub(crate) tip: Vector,
@@ -55,7 +55,7 @@ pub(crate) fn begin(arm: &mut Arm, targets: FineTargets, pace: Pace) -> Result<J
     JointMove::begin_at_pace(arm, targets, pace)
 }
 
-/// Waits for a move. If the caller ends the wait, the arm holds.
+/// Waits for a move, and returns the measured angles in degrees. If the caller ends the wait, the arm holds.
 pub(crate) fn finish(arm: &mut Arm, sent: &JointMove, watch: &mut Watch<'_>) -> Result<[f64; 7], MoveError> {
     let finished = sent.finish(arm, watch);
     if finished == Err(MoveError::Interrupted) {
@@ -134,7 +134,7 @@ fn speed_within(start: LineStart, tip: Vector, seconds: f64) -> Result<f64, Stra
     }
 }
 
-/// Waits on the clock of the arm's line.
+/// Waits on the clock of the arm's line. If the caller ends the wait, the arm holds.
 pub(crate) fn sleep(arm: &mut Arm, time: Duration, watch: &mut Watch<'_>) -> Result<(), MoveError> {
     let slept = sleep_until(arm, arm.now() + time, watch);
     if slept.is_err() {
@@ -199,7 +199,7 @@ pub(crate) fn sample(
     Ok((times, rows))
 }
 
-/// What to record.
+/// Time limit (`None`: until a signal), rate of the reports, and whether a hand guides the arm without torque.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RecordOptions {
     pub(crate) limit: Option<Duration>,
@@ -207,7 +207,6 @@ pub(crate) struct RecordOptions {
     pub(crate) is_guided: bool,
 }
 
-/// What was recorded.
 #[derive(Debug, Default)]
 pub(crate) struct Recorded {
     /// The text of the recording.
@@ -287,7 +286,7 @@ pub(crate) struct PlayOptions {
     pub(crate) approach: ApproachRule,
 }
 
-/// Plays a recording, and returns the measured positions of the first run.
+/// Plays a recording, and returns the measured positions of the first run as the text of a recording.
 pub(crate) fn play(
     arm: &mut Arm,
     recording: &Recording,

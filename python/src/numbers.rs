@@ -1,4 +1,4 @@
-//! Numbers of Python: lists, tuples, arrays and whatever can be iterated, without texts and bytes.
+//! Numbers of Python, single or in lists, tuples, arrays and other ordered collections. Texts and bytes are not numbers.
 
 use std::time::Duration;
 

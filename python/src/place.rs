@@ -6,12 +6,12 @@ use pyo3::prelude::*;
 
 use crate::errors::{PortError, error};
 
-/// Each arm has a thread, a thread has four mappings of memory, and Linux allows a process 65,530.
+/// The most open arms of a process. Each arm has a thread with four memory mappings, and Linux allows a process 65,530 of them.
 const MOST_ARMS: usize = 8_192;
-/// The open arms of this process.
+/// The number of open arms of this process.
 static OPEN_ARMS: AtomicUsize = AtomicUsize::new(0);
 
-/// The right to one of these arms. Dropping it frees the place.
+/// The right to one of [`MOST_ARMS`] arms. Dropping it frees the place.
 pub(crate) struct Place;
 
 impl Place {

@@ -27,7 +27,7 @@ pub(crate) fn ports(py: Python<'_>, baud: i64) -> PyResult<Vec<Found>> {
     Ok(arms.collect())
 }
 
-/// The token for a server, which has to be at an address that takes one.
+/// Checks a token: its characters, and that `port` is the address of a server that takes one.
 pub(crate) fn token(py: Python<'_>, port: &str, token: Option<String>) -> PyResult<Option<String>> {
     let Some(token) = token else { return Ok(None) };
     if !is_token(&token) {

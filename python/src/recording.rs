@@ -213,7 +213,7 @@ impl Recording {
 }
 
 impl Recording {
-    /// The first `length` of every `step`-th moment from `start` on. Fails for a negative step, because time goes forward.
+    /// Each `step`-th moment from `start` on, `length` moments at most. Fails for a negative step, because time goes forward.
     fn part(&self, py: Python<'_>, (start, step): (isize, isize), length: usize) -> PyResult<Self> {
         let (Ok(start), Ok(step @ 1..)) = (usize::try_from(start), usize::try_from(step)) else {
             return Err(InvalidValue::raise(py, "a part of a recording goes forward: use a positive step"));

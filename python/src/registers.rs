@@ -43,7 +43,8 @@ pub(crate) fn get(py: Python<'_>, worker: &Worker, name: &str) -> PyResult<Shown
     }
 }
 
-/// Writes the registers of a name, and verifies them.
+/// Writes the registers of a name, and verifies them. A write of targets first ends a stream that a program has left; a write
+/// that switches the motors off warns of silent servos.
 pub(crate) fn set(
     py: Python<'_>,
     worker: &Worker,
@@ -87,7 +88,7 @@ fn warn_of_silent(py: Python<'_>, silent: u8) -> PyResult<()> {
     PyErr::warn(py, py.get_type::<PyUserWarning>().as_any(), &CString::new(text)?, 1)
 }
 
-/// What [`access()`] calls a register that must not be used.
+/// The text that [`access()`] returns for a register that must not be used.
 const RESERVED: &str = "reserved";
 
 /// The names of the registers that this arm has, each once.

@@ -61,7 +61,7 @@ impl Simulation {
         Self { shared, process: std::process::id() }
     }
 
-    /// What the arm and its line share.
+    /// The simulation that the arm and its line share.
     pub(crate) const fn shared_with_line(&self) -> &SharedSimulation {
         &self.shared
     }

@@ -23,7 +23,7 @@ pub(crate) struct Status {
 }
 
 impl Status {
-    /// Reads it from an arm; `None` if the firmware has no status block.
+    /// Reads the status of an arm; `None` if the firmware has no status block.
     pub(crate) fn read(arm: &mut Arm) -> Result<Option<Self>, Error> {
         let joints = arm.read_span(JointSnapshot::REGISTERS)?;
         let registers = arm.with_blocks(&joints)?;

@@ -113,7 +113,8 @@ impl PacedStream<'_> {
         Ok(())
     }
 
-    /// Returns the number of the point, and the last points of all joints in degrees.
+    /// Sends a point when it is due. First approaches the first point of a joint. Returns the number of the point, and the last
+    /// points of all joints in degrees.
     fn send_when_due(
         &mut self,
         point: &FineTargets,
@@ -146,7 +147,7 @@ impl PacedStream<'_> {
         Ok((number, self.pose))
     }
 
-    /// Goes to the first point of joints. The next point is due afterwards.
+    /// Moves joints to their first point, by the rule of the stream. The period of later points begins after this move.
     pub(crate) fn approach(&mut self, first: &FineTargets, watch: &mut Watch<'_>) -> Result<(), MoveError> {
         // Before the end of start-up it is not known where the joints stand.
         self.stream.arm().wait_until_settled()?;
@@ -174,7 +175,7 @@ impl Stream {
         self.check_open(py)?;
         let failed = exception.get_item(0).is_ok_and(|kind| !kind.is_none());
         let arrived = if failed {
-            // The way to a first action, which no call waits for, ends here.
+            // End the approach of a first action, for which no call waits.
             self.worker.interrupt();
             Ok(Ok(()))
         } else {

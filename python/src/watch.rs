@@ -18,7 +18,7 @@ use crate::latest::LatestSlot;
 /// The longest time that a read of another thread waits for an arm that moves.
 const BETWEEN_READS: Duration = Duration::from_millis(20);
 
-/// A stream that Python opens.
+/// The order of Python to open a stream.
 pub(crate) struct StreamOrder {
     pub(crate) options: StreamOptions,
     pub(crate) rule: ApproachRule,
@@ -27,7 +27,7 @@ pub(crate) struct StreamOrder {
     pub(crate) simulation: Option<SharedSimulation>,
 }
 
-/// A stream, when its next point is due, and which joints had one.
+/// An open stream, with the time of its next point, and the joints that had a point.
 pub(crate) struct PacedStream<'a> {
     pub(crate) stream: SetPointStream<'a>,
     pub(crate) pace: StreamPace,
@@ -82,7 +82,7 @@ impl<'a> PacedStream<'a> {
         self.stream.arm().elapsed()
     }
 
-    /// Puts the registers back.
+    /// Puts the registers back, and closes the slot for actions, also if this fails.
     pub(crate) fn close(self) -> Result<(), StreamError> {
         let closed = self.stream.close();
         self.slot.close();
@@ -135,7 +135,7 @@ impl CallState {
         !self.is_claimed.swap(true, Ordering::Relaxed)
     }
 
-    /// A signal of Python ends the call.
+    /// Ends the call because of a signal of Python.
     pub(crate) fn interrupt(&self) {
         self.is_interrupted.store(true, Ordering::Relaxed);
     }
@@ -185,7 +185,7 @@ impl Inbox {
         }
     }
 
-    /// Runs the reads that other threads wait for. Keeps everything else for later, in its order.
+    /// Runs the reads that other threads wait for, and drops [`Message::Wake`]. Keeps everything else for later, in its order.
     fn serve_reads(&self, arm: &mut Arm) {
         while let Ok(message) = self.messages.try_recv() {
             match message {

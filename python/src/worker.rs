@@ -48,7 +48,7 @@ pub(crate) struct Worker {
 }
 
 impl Worker {
-    /// Starts a thread that opens an arm and owns it. Returns also what `seen` says of the arm. The inner error is that of the
+    /// Starts a thread that opens an arm and owns it. Also returns the result of `seen`. The inner error is a failure to open the
     /// arm. A signal of Python ends the wait.
     pub(crate) fn start<T: Send + 'static>(
         py: Python<'_>,
@@ -170,7 +170,7 @@ impl Worker {
             if is_other_open { Closed::raise_other_stream(py) } else { error }
         })?;
         if matches!(opened, (Ok(()), Some(_))) {
-            // The caller leaves.
+            // A signal ends the `with` statement before its body, so the caller does not close the stream.
             self.abandon_stream();
         }
         finish(py, opened)

@@ -10,7 +10,7 @@ import pytest
 
 @pytest.fixture
 def ctrl_c() -> Iterator[None]:
-    """Ctrl-C raises KeyboardInterrupt, also in a background job, where the shell has it ignored."""
+    """Makes Ctrl-C raise KeyboardInterrupt, also in a background job, for which the shell has set it to be ignored."""
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
     signal.signal(signal.SIGINT, before)

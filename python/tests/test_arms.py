@@ -19,7 +19,7 @@ Arms = sevenbot.SimulatedArms
 
 
 def actions(n: int, step: int) -> NDArray[numpy.float64]:
-    """Angles round the pose of rest, others for each arm and step."""
+    """Angles near the pose of rest, different for each arm and step."""
     turns = numpy.add.outer(numpy.arange(n) * 7 + step * 3, numpy.arange(7) * 5) % 11
     angles: NDArray[numpy.float64] = numpy.array(REST) + turns - 6.0
     return angles
@@ -87,7 +87,7 @@ def test_arrays_are_read_and_filled_in_place(kind: type[numpy.float32]) -> None:
     assert arms.observe(out) is out
     assert (out == seen).all()
     assert arms.observe() == pytest.approx(seen, rel=1e-5)
-    # With gaps, as a list, and of whole numbers.
+    # Arrays with gaps are copied, and so are lists.
     assert arms.step(numpy.zeros((5, 14), dtype=kind)[:, ::2] + 90).shape == (5, 32)
     arms.step(numpy.full((10, 7), 90, dtype=kind)[::2])
     arms.step([REST] * 5)
@@ -114,7 +114,7 @@ def test_masks_choose_arms() -> None:
 
 
 def seen_from(snapshot: sevenbot.SimulationSnapshot) -> NDArray[numpy.float64]:
-    """All observations of ten steps of two arms that begin with this one."""
+    """All observations of ten steps of two arms that begin as this snapshot."""
     arms = Arms(2, threads=1)
     arms.reset(snapshot=snapshot)
     return numpy.array([arms.step(actions(2, step)) for step in range(10)])

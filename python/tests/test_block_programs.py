@@ -22,11 +22,11 @@ import sevenbot
 
 EXAMPLES = Path(__file__).parents[2] / "web/block-programs/examples"
 PROGRAMS = os.environ.get("SEVENBOT_PROGRAMS")
-#: Degrees.
+#: The largest difference between an angle here and in the page, in degrees.
 TOLERANCE = 0.5
-#: Seconds. No test fails because a machine is slow.
+#: The timeout of waits in seconds. It is long, because the machine may be busy.
 ENOUGH = 120.0
-#: Seconds. On a busy machine an answer of the emulator may take longer than a program waits by itself.
+#: The reply timeout in seconds. On a busy machine an answer of the emulator may take longer than the default timeout.
 ANSWER_TIME = 20.0
 #: What happens on a machine that is too busy for an emulator: the arm stops on its way, or the answers of servos are late.
 BUSY = ("this program paused", "does not answer", "no servo answers")
@@ -64,7 +64,7 @@ def test_there_are_examples() -> None:
 
 @contextlib.contextmanager
 def started(words: list[str], link: Path) -> Iterator[Path]:
-    """An arm of one of the programs, at this link."""
+    """Starts one of the project's programs, which makes an arm at this link, and ends it again."""
     process = subprocess.Popen([*words, "--link", str(link)], stdout=subprocess.PIPE, text=True)
     try:
         assert process.stdout is not None
@@ -105,7 +105,7 @@ def test_a_program_ends_on_the_image_for_the_arm_where_it_does_in_the_page(
                 run_here(program, patient_arm, monkeypatch, [str(link)])
                 break
             except sevenbot.NotReached as failure:
-                # The program is begun anew then.
+                # Then run the program again from its beginning.
                 if time.monotonic() >= end or not any(text in str(failure) for text in BUSY):
                     raise
                 time.sleep(1.0)

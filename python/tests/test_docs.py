@@ -1,4 +1,4 @@
-"""Runs the Python blocks of the pages in docs/, each page in order."""
+"""The Python blocks of docs/python.md run in order. The blocks of docs/simulation.md pass a type checker, and its tests pass."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ DOCS = Path(__file__).parents[2] / "docs"
 
 
 def blocks(page: Path) -> list[tuple[int, str]]:
-    """The blocks with their first lines."""
+    """The Python blocks of a page, each with the number of its first line."""
     text = page.read_text(encoding="utf-8")
     found = re.finditer(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
     return [(text.count("\n", 0, block.start(1)) + 1, block.group(1)) for block in found]

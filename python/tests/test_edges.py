@@ -22,12 +22,12 @@ import pytest
 import sevenbot
 
 REST = (90.0, 90.0, 65.0, 90.0, 90.0, 90.0, 80.0)
-#: Seconds. No test fails because a machine is slow.
+#: The timeout of waits in seconds. It is long, because the machine may be busy.
 ENOUGH = 120.0
 
 
 def in_a_process(program: str) -> str:
-    """What a program prints. It fails if the program does not end."""
+    """Runs a program in a process of its own, and returns what it prints. Fails if the program fails or does not end."""
     command = [sys.executable, "-c", program]
     done = subprocess.run(command, capture_output=True, text=True, timeout=ENOUGH)
     assert done.returncode == 0, done.stdout + done.stderr
@@ -68,7 +68,7 @@ def test_a_watchdog_is_never_rounded_to_none(simulated_arm: sevenbot.Arm, watchd
         assert simulated_arm.get("watchdog") == 0
 
 
-# What the scripts that fork begin with.
+# The first lines of the scripts that fork.
 FORKED = """
 import os, signal, threading, time, sevenbot
 
@@ -364,7 +364,7 @@ def test_a_closed_arm_has_no_angles(simulated_arm: sevenbot.Arm) -> None:
 
 
 def stopped(arm: sevenbot.Arm, call: Callable[[], object]) -> BaseException | None:
-    """What a call raises that another thread stops."""
+    """Runs a call in another thread, and stops the arm until the call ends. Returns the exception of the call."""
     raised: list[BaseException] = []
     begun, ended = threading.Event(), threading.Event()
 

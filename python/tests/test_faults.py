@@ -1,7 +1,7 @@
-"""Every method that reads or drives the arm, times every fault of the simulator: none reports a success that was none.
+"""Each method in `ROWS` under each fault in `FAULTS`: no method reports success unless the arm did what it was asked.
 
-The snapshot beside this file holds what each method does under each fault. Its lines were read one by one: a method succeeds
-only where the arm did what it was asked, or where it was asked for words alone.
+The snapshot beside this file holds what each method does under each fault. A method succeeds only where the arm did what it was
+asked, or where the method only reads.
 
 `SNAPSHOT=write` writes the snapshot anew. `CELL="stop / silent"` runs these cells only, and prints all that they say.
 """
@@ -22,11 +22,11 @@ import sevenbot
 SNAPSHOT = Path(__file__).with_name("faults.txt")
 REST = (90, 90, 65, 90, 90, 90, 80)
 GOAL = (110, 105, 65, 90, 90, 90, 80)
-#: A joint this near to an angle is there, in degrees: servos have play, and the arm bends.
+#: A joint has reached an angle if it is within this many degrees: servos have play, and the arm bends.
 NEAR = 3.0
 #: A joint that moves by less than this in `AFTERWARDS` stands still, in degrees.
 STILL = 1.5
-#: The arm has this time to do what a method began, in seconds.
+#: Seconds after the end of a method, in which the arm completes the move that the method began.
 AFTERWARDS = 3.0
 #: The arm has received this many frames before. A method detects a restart by the counter of frames.
 USED = 100
@@ -217,7 +217,7 @@ ROWS = [
 
 @dataclass(frozen=True)
 class Fault:
-    """A column: what the arm has since before the call, or what happens during it."""
+    """A column: a fault that begins before the call, or an event during the call."""
 
     name: str
     since_before: str | None = None
@@ -246,7 +246,7 @@ FAULTS = [
 
 
 def registers_of(arm: sevenbot.Arm) -> dict[str, object] | None:
-    """The registers that are looked at. The arm may be closed or gone."""
+    """The registers that the checks use; `None` if the arm is closed or does not answer."""
     try:
         # First the targets, which the arm changes by itself when it notices a fault.
         positions = enumerate(arm.get("target-position"), start=1)
@@ -317,7 +317,7 @@ def table(cells: dict[tuple[str, str], Cell]) -> str:
 def test_no_method_reports_success_under_a_fault_that_prevents_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    # The kept poses of `park` are not those of this computer.
+    # Keep the park poses of this computer out of the test.
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
     only = os.environ.get("CELL", "")
     pairs = [(row, fault) for row in ROWS for fault in FAULTS if only in f"{row.name} / {fault.name}"]

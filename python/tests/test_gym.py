@@ -32,7 +32,7 @@ def test_gymnasium_accepts_an_environment(task: str, disturbed: bool) -> None:
 
 
 def episode(envs: Any, seed: int) -> list[Any]:
-    """All that 60 steps give."""
+    """The observations, rewards and truncations of 60 steps."""
     rows = [envs.reset(seed=seed)[0]]
     actions = numpy.random.default_rng(1).uniform(-1, 1, (60, envs.num_envs, 5)).astype(numpy.float32)
     for action in actions:

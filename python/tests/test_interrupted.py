@@ -1,4 +1,4 @@
-"""Streams and calls that something ends early."""
+"""Streams and calls that an exception, a signal, a cancellation or the garbage collector ends early."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ import sevenbot
 from sevenbot import aio
 
 REST = [90.0, 90.0, 65.0, 90.0, 90.0, 90.0, 80.0]
-#: Seconds. No test fails because a machine is slow.
+#: The timeout of waits in seconds. It is long, because the machine may be busy.
 ENOUGH = 120.0
 
 

@@ -13,7 +13,7 @@ from sevenbot import aio
 
 REST = [90.0, 90.0, 65.0, 90.0, 90.0, 90.0, 80.0]
 PERIOD = 0.02
-#: Seconds. No test fails because a machine is slow.
+#: The timeout of waits in seconds. It is long, because the machine may be busy.
 ENOUGH = 120.0
 
 

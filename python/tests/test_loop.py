@@ -17,7 +17,7 @@ TURNS = 1000
 
 
 def turns_on_time(damaged_percent: float, seed: int) -> int:
-    """In how many of 1,000 turns of 20 ms one read and one point are done in time."""
+    """The number of turns of 20 ms, out of 1,000, in which one read and one point are done in time."""
     with sevenbot.Arm.simulated(seed) as arm:
         arm.sleep(1)
         made, last = 0, -1

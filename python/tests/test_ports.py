@@ -1,4 +1,4 @@
-"""Arms by their address, number and chip: behind a real server, which a real simulator feeds.
+"""Arms by their address, number and chip: behind a running `sevenbot serve`, in front of a running simulator.
 
 `cargo xtask test` builds both programs, and names their folder in SEVENBOT_PROGRAMS.
 """
@@ -19,7 +19,7 @@ import sevenbot
 PROGRAMS = os.environ.get("SEVENBOT_PROGRAMS")
 pytestmark = pytest.mark.skipif(PROGRAMS is None, reason="SEVENBOT_PROGRAMS names no folder with host-sim and sevenbot")
 TOKEN = "correct-horse"
-#: Seconds. No test fails because a machine is slow.
+#: The timeout of waits in seconds. It is long, because the machine may be busy.
 ENOUGH = 120.0
 
 
@@ -36,7 +36,7 @@ def start(*words: str) -> subprocess.Popen[str]:
 
 
 def ready(process: subprocess.Popen[str], word: str) -> str:
-    """What a program says that it has, of this kind."""
+    """The rest of the first line `ready ...` of a program that contains `word`."""
     assert process.stdout is not None
     for line in process.stdout:
         kind, _, what = line.strip().partition(" ")
@@ -69,7 +69,7 @@ def test_a_server_wants_its_token(server: Server, monkeypatch: pytest.MonkeyPatc
         assert arm.get("device-id") == 42 and arm.port == server.address
     with pytest.raises(sevenbot.PortError):
         sevenbot.Arm(server.address, token="wrong-horse", timeout=0.2, attempts=1)
-    # The argument goes before the variable.
+    # The argument has precedence over the environment variable.
     monkeypatch.setenv("SEVENBOT_TOKEN", "wrong-horse")
     with sevenbot.Arm(server.address, token=TOKEN) as arm:
         assert arm.is_connected

@@ -22,7 +22,7 @@ import sevenbot
 REST = [90.0, 90.0, 65.0, 90.0, 90.0, 90.0, 80.0]
 COUNT = 250
 PROGRAMS = os.environ.get("SEVENBOT_PROGRAMS")
-#: Seconds. No test fails because a machine is slow.
+#: The timeout of waits in seconds. It is long, because the machine may be busy.
 ENOUGH = 120.0
 
 

@@ -1,4 +1,4 @@
-"""The room of a simulated arm: a table, walls, and things that it grips and pushes."""
+"""The room of a simulated arm: a table, and things that the arm grips and drops."""
 
 from __future__ import annotations
 

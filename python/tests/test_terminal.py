@@ -33,12 +33,12 @@ try:
 except KeyboardInterrupt:
     print("interrupted", arm.get("target-position.1"))
 """
-# Seconds.
+# The timeout of waits in seconds.
 ENOUGH = 60.0
 
 
 class Terminal:
-    """A pseudo-terminal with a Python program, which is killed with it."""
+    """A pseudo-terminal with a Python program. The end of the context kills the program."""
 
     def __init__(self, program: str) -> None:
         self.shown = ""

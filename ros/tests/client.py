@@ -103,15 +103,15 @@ class Client:
         return service, service.call_async(request)
 
     def finish(self, service: Any, future: Any) -> tuple[bool, str]:
-        """The answer of a service."""
+        """Waits for the answer of a service, and returns it."""
         self.until(future.done, "answer of a service")
         answer = future.result()
         self.node.destroy_client(service)
         return answer.success, answer.message
 
     def each(self, period: float, count: int, act: Callable[[int], None]) -> None:
-        """Acts so often, a period of this client's clock or more after the last time, and hears meanwhile. What a busy machine made
-        late is not caught up: a command that leaps ahead would be a jump."""
+        """Acts `count` times, at least a period of this client's clock apart, and hears meanwhile. Delays of a busy machine are
+        not caught up, because a command that leaps ahead would be a jump."""
         due = self.seconds()
         for index in range(count):
             self.spin(0.0)

@@ -48,7 +48,7 @@ class Program:
         return int(next(line.split()[1] for line in status.splitlines() if line.startswith("VmRSS")))
 
     def end(self, how: signal.Signals = signal.SIGKILL) -> int:
-        """Ends it, and waits."""
+        """Ends the process and its children, waits, and returns its exit status."""
         if self.process.poll() is None:
             os.killpg(self.process.pid, how)
         return self.process.wait(TIMEOUT)
@@ -112,7 +112,7 @@ _DOMAINS = itertools.count(1 + 50 * int(os.environ.get("PYTEST_XDIST_WORKER", "g
 
 @pytest.fixture
 def domain() -> int:
-    """A domain of its own for each test, in which no node of another one is left."""
+    """A domain of its own for each test, in which no node of another test is left."""
     return next(_DOMAINS)
 
 

@@ -9,17 +9,17 @@ from client import Client, seconds_of
 from conftest import Program
 from diagnostic_msgs.msg import KeyValue
 
-# Degrees.
+# The standard pose, in degrees of the model.
 HOME = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 80.0]
 
 
 def values(client: Client) -> list[KeyValue]:
-    """Those of the newest diagnosis."""
+    """The values of the newest diagnosis; none before the first one."""
     return client.diagnostics[-1].status[0].values if client.diagnostics else []
 
 
 def level(client: Client) -> tuple[int, str]:
-    """The newest diagnosis."""
+    """The level and the message of the newest diagnosis."""
     status = client.diagnostics[-1].status[0]
     return status.level[0], status.message
 
@@ -31,8 +31,8 @@ def healthy(client: Client) -> None:
 
 
 def lead(client: Client, node: Program, send: Callable[[], None], is_there: Callable[[], bool]) -> None:
-    """Sends commands until the joints are there. The servos of the emulator answer late on a busy machine: then the arm holds, as it
-    has to, and takes commands after `hold`."""
+    """Sends commands until the joints are there. The servos of the emulator answer late on a busy machine: then the arm holds,
+    and this function calls `hold`, so that commands are taken again."""
     held = 0
 
     def go() -> bool:
@@ -70,7 +70,7 @@ def bus_errors(client: Client) -> int:
 
 
 def state_now(client: Client) -> list[float]:
-    """Degrees that were measured after this call."""
+    """The positions of a state that was measured after this call, in degrees of the model."""
     now = client.seconds()
     client.until(lambda: seconds_of(client.states[-1]) > now, "a new state")
     return client.degrees()

@@ -25,7 +25,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 JOINTS = ["joint_1", "joint_2", "joint_3", "joint_5"]
 # The pose in which the path begins and ends, in degrees of the model: with the forearm up a joint bends less than a degree.
 BEGIN = (0.0, 0.0, -45.0, 0.0)
-# Degrees of the model and the phase of each joint.
+# The amplitude of each joint in degrees of the model, and its phase in radians.
 WAVES = ((30.0, 0.0), (-8.0, 1.0), (6.0, 0.0), (15.0, 3.0))
 POINTS, STEP = 500, 0.02
 
@@ -58,7 +58,7 @@ def long_path() -> JointTrajectory:
 
 
 def way_to_begin() -> JointTrajectory:
-    """One point without velocities."""
+    """A trajectory of one point, `BEGIN`, without velocities."""
     message = JointTrajectory(joint_names=JOINTS)
     message.points = [JointTrajectoryPoint(positions=[math.radians(angle) for angle in BEGIN])]
     message.points[0].time_from_start.sec = 2
@@ -74,7 +74,7 @@ def claw() -> JointTrajectory:
 
 
 def later(seconds: float) -> JointTrajectory:
-    """The way to `BEGIN`, that begins so many seconds later."""
+    """The trajectory to `BEGIN`, which begins this many seconds from now."""
     message = way_to_begin()
     message.header.stamp = stamp(time.time() + seconds)
     return message

@@ -1,4 +1,4 @@
-"""The packages as files: names, schemas and the description."""
+"""The description as a file: joints, limits, meshes and kinematics. Also the health that is computed from registers."""
 
 from __future__ import annotations
 

@@ -13,13 +13,14 @@ from leading import HOME, bus_errors, hold, is_silence, lead, state_now, values
 
 Report = Callable[[str], None]
 Clients = Callable[..., Client]
-# A stream that had no command for so long may have ended, and the next one begins with an approach. Seconds.
+# Seconds. After a longer gap between commands the stream may have ended. The next one then begins with an approach.
 LONGEST_GAP = 0.2
 APPROACH = 1.0
 
 
 def test_the_emulated_image_follows_a_sine_and_stops(start: Start, client: Clients, report: Report) -> None:
-    """The emulator runs in the time of the computer. So states count while nothing made the arm hold, and the delay is only told."""
+    """The emulator runs in real time. So only states count that come a second or more after a gap in the commands, and the delay
+    is reported, not checked."""
     start.emulator()
     node = start.node(start.link, jump="approach", max_age=30.0)
     leading = client()
@@ -50,7 +51,8 @@ def test_the_emulated_image_follows_a_sine_and_stops(start: Start, client: Clien
         for lag in (step / 200 for step in range(80))
     ]
     error, lag = min(lags)
-    # Above 2 degrees if the arm does not move, goes half the way, or is 0.7 s late; 0.3 with a load average of 5.6 on 2 cores.
+    # The error is above 2 degrees if the arm does not move, goes half the way, or is 0.7 s late. It is 0.3 degrees with a load
+    # average of 5.6 on 2 cores.
     report(f"a sine of 8 degrees and 0.2 Hz on the emulated image: median error {error:.2f} degrees behind {lag:.3f} s")
     assert error < 1.5
     assert all(-1.5 < pose[0] < 17.5 for _, pose in told)

@@ -234,7 +234,7 @@ def test_a_signal_ends_the_program_without_a_complaint(start: Start, client: Cli
 
 
 def test_memory_does_not_grow(start: Start, client: Clients, report: Report) -> None:
-    """Ten minutes with `MEMORY_SECONDS=600`; else as long as a run for each change allows."""
+    """Each stretch lasts `MEMORY_SECONDS`, by default 10 s. There are at least two."""
     seconds = float(os.environ.get("MEMORY_SECONDS", "10"))
     node = start.node(real_time_factor=2.0)
     leading = client(simulated_time=True)

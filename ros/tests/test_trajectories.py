@@ -33,8 +33,8 @@ TIMES = [number * STEP for number in range(POINTS + 1)]
 
 
 def along_path(states: list[JointState]) -> str:
-    """How far from the path the joints were. On a busy machine a command comes late now and then: the arm cuts a corner of the
-    path there, and nowhere else."""
+    """Checks how far from the path the joints were, and describes it. On a busy machine a late command makes the arm cut a corner
+    of the path."""
     off = sorted(distance_to_path(state, TIMES) for state in states)
     usual, worst = off[len(off) * 95 // 100], off[-1]
     assert usual < 1.0 and worst < 3.0, (usual, worst)
@@ -51,7 +51,7 @@ def arm_action(client: Clients) -> tuple[Client, ActionClient]:
 
 
 def goal(client: Client, server: ActionClient, order: int, feedback: list[Any]) -> Any:
-    """The handle of an accepted goal."""
+    """Sends a goal. Returns its handle, which tells whether the goal was accepted."""
     sent = server.send_goal_async(
         Fibonacci.Goal(order=order), feedback_callback=lambda message: feedback.append(message.feedback.sequence)
     )
@@ -79,7 +79,7 @@ def test_an_action_of_500_points(start: Start, client: Clients, report: Report) 
     assert result(leading, handle) == (4, 0), node.text()
     report(f"a trajectory of {POINTS} points as an action: {along_path(leading.states)}")
     assert len(leading.states) > 100 and len(feedback) > 10
-    # Cancelled in the middle, it stays there.
+    # The arm stays where it was when the trajectory is cancelled.
     handle = goal(leading, server, 1, feedback)
     leading.until(lambda: abs(leading.degrees()[0]) > 10.0, "motion")
     cancelled = handle.cancel_goal_async()

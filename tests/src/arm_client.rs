@@ -1,4 +1,5 @@
-//! A client that sends any bytes to the arm. Every byte from the arm must belong to a reply with a valid checksum.
+//! A client that sends arbitrary bytes to the arm. The methods that parse frames panic at a byte outside a frame and at an
+//! invalid checksum.
 
 use std::io::{ErrorKind, Read, Write};
 use std::path::Path;
@@ -33,7 +34,7 @@ impl ArmClient {
         Self { port: wait_for(name, open) }
     }
 
-    /// Sends any bytes.
+    /// Sends bytes, which need not form a frame.
     pub fn send(&mut self, bytes: &[u8]) {
         self.port.write_all(bytes).expect("the port takes bytes");
     }
@@ -83,14 +84,14 @@ impl ArmClient {
         self.read(address, 1)[0]
     }
 
-    /// The value of a counter of two registers.
+    /// The value of a 16-bit counter; `address` is the register of its low byte.
     #[track_caller]
     pub fn counter(&mut self, address: u8) -> u16 {
         let bytes = self.read(address, 2);
         u16::from_le_bytes([bytes[0], bytes[1]])
     }
 
-    /// Reads like [`ArmClient::read`]. `None` if the next frame within `timeout` is not the reply.
+    /// Reads like [`ArmClient::read`]. `None` if no frame begins within `timeout`, or the next frame is not the reply.
     #[track_caller]
     pub fn try_read(&mut self, address: u8, count: u8, timeout: Duration) -> Option<Vec<u8>> {
         self.send(&read_request(address, count));
@@ -125,7 +126,7 @@ impl ArmClient {
         Some(frame)
     }
 
-    /// The next frame. Fails if none begins before the timeout.
+    /// The next reply or report of map 2.2. Panics if none begins within [`TIMEOUT`].
     #[track_caller]
     pub fn reply(&mut self) -> ReplyFrame {
         self.reply_within(TIMEOUT).expect("a frame from the arm")

@@ -29,13 +29,13 @@ impl Control {
         serde_json::from_str(&line).expect("JSON")
     }
 
-    /// The answer to a request.
+    /// Sends a request and returns its answer, which may be an error.
     pub fn ask(&mut self, request: &Value) -> Value {
         self.send(format!("{request}\n").as_bytes());
         self.answer()
     }
 
-    /// The result of a request.
+    /// Sends a request and returns its result. Panics if the answer is an error.
     #[track_caller]
     pub fn result(&mut self, request: &Value) -> Value {
         let mut answer = self.ask(request);

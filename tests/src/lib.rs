@@ -1,6 +1,6 @@
-//! System tests know bytes only: frames through a serial port. The arm under test is the simulator, the firmware in an
-//! emulator (`ARM=emulator`), the controller on this computer with servos behind a simulated USB adapter
-//! (`ARM=adapter`), or the arm on `ARM_PORT`.
+//! What the system tests share. They use the product from outside only: through ports, sockets and programs. The arm of
+//! [`with_arm`] is the simulator, the firmware in an emulator (`ARM=emulator`), the controller on this computer with servos
+//! behind a simulated USB adapter (`ARM=adapter`), or the arm on `ARM_PORT`.
 //!
 //! ```text
 //!   tests/system ──▶ TestArm ──▶ ArmClient ──▶ serial port ──▶ StartedArm: one for each test

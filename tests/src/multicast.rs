@@ -1,4 +1,4 @@
-//! Does the system pass multicast between its own programs?
+//! Checks whether this computer delivers multicast datagrams from one of its programs to another.
 
 use std::net::{Ipv4Addr, UdpSocket};
 use std::time::Duration;

@@ -42,7 +42,7 @@ impl RunningProgram {
     /// Kills the program, unless it has ended.
     pub fn kill(&mut self) {
         let Some(child) = &mut self.child else { return };
-        // A process that has ended and was waited for has no id.
+        // Signal a running process only: after a wait, another process may have its id.
         if self.has_processes && matches!(child.try_wait(), Ok(None)) {
             let _ = kill_process(Pid::from_child(child), Signal::TERM);
             let _ = child.wait();
@@ -81,7 +81,7 @@ impl Drop for RunningProgram {
 /// Starts a program that prints `ready PORT` for each of its ports, and waits for these lines.
 ///
 /// # Errors
-/// Another line, or an empty one after a timeout.
+/// The line that came instead of `ready PORT`. It is empty if no line came before the timeout or the end of the program.
 pub fn start(command: &mut Command, ports: usize) -> Result<(RunningProgram, Vec<PathBuf>), String> {
     let mut program = RunningProgram::spawn(command.stdin(Stdio::null()).stdout(Stdio::piped()));
     let lines = lines(program.stdout.take().expect("a pipe"));
@@ -107,7 +107,7 @@ pub fn send_signal(process: &Child, signal: Signal) {
     kill_process(Pid::from_child(process), signal).expect("the process is running");
 }
 
-/// Memory of a program in KiB.
+/// Resident memory of a process in KiB.
 #[must_use]
 pub fn kilobytes(process: &Child) -> u64 {
     let status = std::fs::read_to_string(format!("/proc/{}/status", process.id())).expect("a status");

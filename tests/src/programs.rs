@@ -18,7 +18,8 @@ pub fn sevenbot() -> &'static Path {
     PATH.get_or_init(|| program("sevenbot-cli", "sevenbot"))
 }
 
-/// The timeout of the tool in milliseconds. It is long, because the machine may be busy.
+/// The environment variable for the timeout of the tool, and its value in milliseconds. The value is large, because the
+/// machine may be busy.
 pub const TOOL_TIMEOUT: (&str, &str) = ("SEVENBOT_TIMEOUT", "10000");
 
 /// The command line tool, with a long timeout.
@@ -36,7 +37,8 @@ pub fn xtask() -> &'static Path {
     PATH.get_or_init(|| program("xtask", "xtask"))
 }
 
-/// The program `name` of a package. It is two folders above the test, as in `target/debug/deps/test-0123`.
+/// The path of the program `name`: for a test in `target/debug/deps`, the program is in `target/debug`. Builds the package if
+/// the program is not current.
 fn program(package: &str, name: &str) -> PathBuf {
     let test = std::env::current_exe().expect("the path of the test");
     let folder = test.ancestors().nth(2).expect("cargo's folders");

@@ -11,7 +11,7 @@ impl Random {
         Self(seed)
     }
 
-    /// The next number, of all 64 bits.
+    /// The next 64-bit number.
     pub const fn bits(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
         let mut mixed = self.0;

@@ -16,7 +16,7 @@ pub const OFFSET: u8 = 13;
 pub const EEPROM_LOCK: u8 = 28;
 /// 0 damping, 1 servo, 2 forceless.
 pub const MOTOR_STATE: u8 = 29;
-/// 0 suction cup, 1 gripper. A RAM register without an effect on the joints, so tests use it most.
+/// 0 suction cup, 1 gripper. A write to this RAM register moves no joint, so most tests of writes use it.
 pub const EFFECTOR_TYPE: u8 = 30;
 /// 1: suck.
 pub const VACUUM_PUMP: u8 = 31;
@@ -40,7 +40,7 @@ pub const FAULTS: u8 = 241;
 pub const MISSING_SERVOS: u8 = 242;
 /// 0: the protection is off.
 pub const PROTECTION: u8 = 192;
-/// Joints that an obstacle keeps from their targets.
+/// Joints that an obstacle keeps from their targets, bit n-1 for joint n (D27).
 pub const BLOCKED_JOINTS: u8 = 195;
 /// Moving joints, bit n-1 for joint n.
 pub const MOVING_JOINTS: u8 = 243;

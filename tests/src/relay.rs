@@ -27,7 +27,7 @@ use crate::wait::wait_for;
 /// The longest time until the relay notices that it has to end, in nanoseconds.
 const POLL_NANOS: i64 = 20_000_000;
 
-/// A frame on the line. The action comes before the frame is passed on.
+/// The time of the action: directly before the relay passes this frame on. N counts from 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Moment {
     /// The Nth frame of the program.
@@ -65,7 +65,8 @@ pub struct RelayPlan {
     pub moment: Moment,
     /// The action.
     pub action: Box<dyn FnMut() -> LineAction + Send>,
-    /// Do about a tenth of the frames of each direction get a wrong checksum? Three tries of a read in a row never fail.
+    /// Is the checksum of every 9th request, every 9th report and every 7th other frame of the arm made wrong? Then of three
+    /// tries of a read in a row, at least one succeeds.
     pub is_noisy: bool,
 }
 
@@ -227,8 +228,8 @@ impl Line {
             return LineAction::Unplug;
         }
         if self.plan.is_noisy {
-            // Reports and answers have separate counters. With one counter, regular reports could make each answer the one that
-            // is disturbed, or no answer at all.
+            // Reports and answers have separate counters. With a common counter, regular reports between the answers could
+            // cause every answer to be disturbed, or none.
             let (count, each) =
                 if is_report(&frame) { (&mut self.reports, 9) } else { (&mut self.answers, 7) };
             *count += 1;
@@ -239,14 +240,14 @@ impl Line {
         LineAction::Nothing
     }
 
-    /// Acts, once.
+    /// Runs the action of the plan at the first call only.
     fn act(&mut self) -> LineAction {
         let is_first = !std::mem::replace(&mut self.has_acted, true);
         if is_first { (self.plan.action)() } else { LineAction::Nothing }
     }
 }
 
-/// Takes the bytes that have come.
+/// Reads at most 4096 bytes from the source into the splitter.
 fn read(source: &OwnedFd, splitter: &mut FrameSplitter) {
     let mut chunk = [0; 4096];
     let length = rustix::io::read(source, &mut chunk).unwrap_or(0);
@@ -280,7 +281,7 @@ fn disturb(frame: &mut [u8], number: u32, each: u32) {
     }
 }
 
-/// Is the frame of the arm a report, and probably no answer?
+/// Does the frame hold registers 142 to 155 or 142 to 183, as reports do if register 189 is 1 or 2?
 fn is_report(frame: &[u8]) -> bool {
     matches!(frame, [_, _, 0x03, 142, 14 | 42, ..])
 }

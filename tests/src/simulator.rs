@@ -23,7 +23,7 @@ pub struct Simulator {
 }
 
 impl Simulator {
-    /// Starts one with these arguments. Without `--eeprom` it keeps no settings.
+    /// Starts a simulator with these arguments. Without `--eeprom` it keeps no settings.
     #[must_use]
     pub fn start(arguments: &[&str]) -> Self {
         let folder = tempfile::tempdir().expect("a folder");
@@ -81,7 +81,7 @@ impl Simulator {
         serde_json::from_str(&self.says(&["state", "--json"])).expect("JSON")
     }
 
-    /// A value of a joint in the state.
+    /// The value of `key` in the state of joint `number`, 1 to 7.
     #[must_use]
     pub fn joint(&self, number: usize, key: &str) -> Value {
         self.state()["joints"][number - 1][key].clone()

@@ -26,7 +26,7 @@ const BAUD: u32 = 115_200;
 /// The number of settings: device id, baud rate code, offsets.
 const SETTINGS: u8 = 9;
 
-/// True if a position is near enough. Registers hold whole degrees, and servos have some play.
+/// True if positions differ by at most 2 degrees: registers hold whole degrees, and servos have some play.
 #[must_use]
 pub const fn near(actual: u8, expected: u8) -> bool {
     actual.abs_diff(expected) <= 2
@@ -83,8 +83,8 @@ impl TestSetup {
     }
 }
 
-/// Runs a test with an arm that has started and is at rest. Skips the test if the arm lacks a capability. With
-/// `ARM_MEETS_ALL_NEEDS` set, this is a failure instead.
+/// Runs a test with an arm that has started. Without servo faults, the arm is in the standard pose. Skips the test if the arm
+/// lacks a capability. With `ARM_MEETS_ALL_NEEDS` set, this is a failure instead.
 pub fn with_arm<T: FnOnce(&mut TestArm)>(setup: TestSetup, test: T) {
     let shared = env::var_os("ARM_PORT").map(|path| ExternalArm(PathBuf::from(path)));
     let kind = ArmKind::chosen();
@@ -180,7 +180,7 @@ impl TestArm {
         self.reopen(BAUD);
     }
 
-    /// Changes a register that a restart resets.
+    /// Writes 1 to a RAM register. [`Self::wait_for_restart`] waits until the restart has reset it to 0.
     fn mark_ram(&mut self) {
         self.write(EFFECTOR_TYPE, &[1]);
         assert_eq!(self.register(EFFECTOR_TYPE), 1, "the mark before a restart");
@@ -224,8 +224,8 @@ impl TestArm {
         self.wait_until("all joints have arrived", |arm| arm.register(MOVING_JOINTS) == 0);
     }
 
-    /// Moves the arm to a pose. On a busy machine a servo may be lost, and its joint then gets its position as the target
-    /// (D12). So the targets are written again if they have changed.
+    /// Moves the arm to a pose, and waits until it is at rest there. On a busy machine a servo may be lost, and its joint then
+    /// gets its position as the target (D12). So the targets are written again if they have changed.
     #[track_caller]
     pub fn drive_to(&mut self, pose: &[u8; 7]) {
         self.write(TARGET_POSITION, pose);
@@ -282,7 +282,7 @@ impl TestArm {
         tool
     }
 
-    /// Runs the command line tool on the port of this arm.
+    /// Runs the command line tool on the port of this arm to its end. Then opens the port again at the default baud rate.
     pub fn sevenbot(&mut self, arguments: &[&str]) -> Output {
         let port = self.lend_port();
         let output = tool().arg("--port").arg(port).args(arguments).output();
@@ -304,7 +304,7 @@ impl TestArm {
 
 impl Drop for TestArm {
     fn drop(&mut self) {
-        // After a failure the arm may not reply, so nothing here waits for it.
+        // After a failure the arm may not reply, so nothing here waits for a reply.
         if let (Some(settings), Some(client)) = (self.settings.take(), self.client.as_mut()) {
             client.write(FEEDBACK_FREQUENCY, &[0]);
             client.write(EEPROM_LOCK, &[0]);

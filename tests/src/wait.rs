@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 pub const TIMEOUT: Duration = Duration::from_secs(180);
 const POLL_PERIOD: Duration = Duration::from_millis(10);
 
-/// Polls until there is a value. The error of a poll describes the state after a timeout.
+/// Polls until there is a value, and returns it. After [`TIMEOUT`], panics with the error of the last poll.
 #[track_caller]
 pub fn wait_for<T>(event: &str, mut poll: impl FnMut() -> Result<T, String>) -> T {
     let deadline = Instant::now() + TIMEOUT;

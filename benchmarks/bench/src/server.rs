@@ -5,7 +5,7 @@ use peers::Server;
 /// Bytes taken from the line at once: the size of a driver's queue, independent of frames.
 const PIECE: usize = 64;
 
-/// Any server as a trait object. The one dynamic call for each stream does not count in the time of a request.
+/// Any server as a trait object. One dynamic call for a whole stream adds almost nothing to the time of a request.
 pub(crate) trait Serve {
     /// Takes a whole stream and appends the replies.
     fn serve(&mut self, stream: &[u8], replies: &mut Vec<u8>);

@@ -23,7 +23,8 @@ pub trait Server {
     /// Takes the next piece of the stream and passes each reply to `reply`.
     fn feed(&mut self, piece: &[u8], reply: &mut impl FnMut(&[u8]));
 
-    /// The line has been silent longer than any timeout: no unfinished frame will be completed.
+    /// Ends the stream as a silence longer than any timeout does: the server drops an unfinished frame, and answers requests that
+    /// are complete behind its header.
     fn end(&mut self, reply: &mut impl FnMut(&[u8]));
 
     /// The number of requests executed so far.

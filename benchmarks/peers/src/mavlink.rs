@@ -70,7 +70,7 @@ impl Dialect for Tunnel {
     }
 }
 
-/// The peer mavlink.
+/// A server that answers reads and writes in TUNNEL messages of MAVLink 2.
 pub struct MavlinkServer {
     reader: MavlinkReader<ReceivedBytes>,
     registers: [u8; 256],

@@ -13,7 +13,7 @@ use crate::Server;
 use crate::inbox::Inbox;
 use crate::work::{REGISTERS, STATION, initial_words};
 
-/// The peer modbus-core.
+/// A Modbus RTU server with functions 3 and 16.
 pub struct ModbusCoreServer {
     inbox: Inbox,
     registers: ModbusRegisters,

@@ -36,7 +36,7 @@ fn as_bytes<S: Serializer>(values: &&[u8], serializer: S) -> Result<S::Ok, S::Er
     serializer.serialize_bytes(values)
 }
 
-/// The peer postcard with cobs.
+/// A server of postcard messages, with a CRC-16 and COBS.
 pub struct PostcardServer {
     inbox: Inbox,
     /// The number of bytes at the front of the inbox that are known to hold no zero.

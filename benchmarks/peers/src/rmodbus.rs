@@ -10,7 +10,7 @@ use crate::Server;
 use crate::inbox::Inbox;
 use crate::work::{REGISTERS, STATION, initial_words};
 
-/// The peer rmodbus.
+/// A Modbus RTU server with all functions of `rmodbus`.
 pub struct RmodbusServer {
     inbox: Inbox,
     registers: ModbusStorage<1, 1, 1, REGISTERS>,

@@ -43,7 +43,7 @@ class Log:
         return cls(table[:, 0], table[:, 1:8], table[:, 8:15], table[:, 15:22])
 
     def loop_times(self) -> str:
-        """For people: how long the turns of the loop were. The first one has the approach."""
+        """The durations of the turns of the loop, as text. The first turn is left out, because it has the approach."""
         turns = np.diff(self.times[1:]) * 1000
         late = int((turns > 40).sum())
         return (
@@ -128,9 +128,9 @@ class EmulatedArm:
     angles: Path
 
     def true_path(self, log: Log, rows: slice, more: float = 0.0) -> tuple[NDArray[np.float64], Rows]:
-        """The times of the log's clock and the true angles, from the first to the last of these rows of a log.
+        """Times by the log's clock, and true angles, from the first to the last of these rows of a log.
 
-        And this much more before and after, in seconds.
+        The result begins `more` seconds before the first row, and ends `more` seconds after the last one.
         """
         table = np.loadtxt(self.angles, delimiter=",")
         # The file has the time since 1970.

@@ -113,9 +113,9 @@ def record_and_replay(lerobot: LeRobot, hand: Path, *robot: str) -> Runs:
 
 
 def check_same_path(what: str, one: Rows, other: Rows, longer_one: Rows | None = None, longer_other: Rows | None = None) -> None:
-    """Two paths are the same within a degree, and all joints move.
+    """Checks that two paths are the same within a degree, and that all joints move.
 
-    The longer ones have what was before and after: the arm is not at the same point of both when they begin and end.
+    The longer paths also hold the motion before and after: the two paths do not begin and end at the same point.
     """
     distances = (
         away(other, one if longer_one is None else longer_one),

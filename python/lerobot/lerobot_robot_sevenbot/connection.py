@@ -15,7 +15,7 @@ START_UP = 1.0
 
 
 class SimulatedTime:
-    """Keeps the virtual time of a simulated arm at the wall clock: LeRobot's loops sleep by that."""
+    """Keeps the virtual time of a simulated arm at the wall clock, because LeRobot's loops sleep by the wall clock."""
 
     def __init__(self, arm: sevenbot.SimulatedArm) -> None:
         """The two clocks begin now."""
@@ -23,7 +23,7 @@ class SimulatedTime:
         self._wall, self._virtual = time.monotonic(), arm.simulation.now
 
     def follow(self) -> None:
-        """Lets the time pass in the simulation that passed here, or the other way round."""
+        """Advances the simulation to the wall clock. If the simulation is ahead, sleeps until the wall clock has caught up."""
         passed = self._arm.simulation.now - self._virtual
         behind = time.monotonic() - self._wall - passed
         if behind > 0:
@@ -59,7 +59,7 @@ class Connection:
             raise
 
     def follow_time(self) -> None:
-        """Call it before each exchange: a simulated arm was not asked meanwhile."""
+        """Brings a simulated arm to the wall clock. Call it before each exchange."""
         if self._time is not None:
             self._time.follow()
 

@@ -7,7 +7,7 @@ from .connection import CALIBRATION, LOGGER, Connection
 
 
 class Device:
-    """The part of a robot or a teleoperator of LeRobot that does not depend on which of them it is."""
+    """What the robot and the teleoperator for LeRobot have in common."""
 
     _connection: Connection | None = None
 

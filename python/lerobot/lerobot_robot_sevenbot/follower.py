@@ -17,9 +17,9 @@ from .device import Device
 from .warned import Warned
 
 SPEED = 60
-"""In steps of 1.9 degrees per second. It bounds that of a stream, and another program may have left a slow one."""
+"""For the speed registers, in steps of 1.9 degrees per second. They limit a stream, and a program may have left them low."""
 SHORTEST_APPROACH, LONGEST_APPROACH = 0.1, 60.0
-"""What a stream takes, in seconds."""
+"""The times for an approach that `Arm.stream` accepts, in seconds."""
 TOLERANCE = 0.5
 """A smaller change of an action is not worth a warning, in degrees: a measured angle may be this far outside."""
 
@@ -117,7 +117,7 @@ class Sevenbot(Device, Robot):
         return joints.to_lerobot("pos", angles)
 
     def _caught_up(self, angles: joints.Angles) -> joints.Angles:
-        """After an approach the arm does not leap to where the leader went meanwhile."""
+        """Limits the steps after an approach, until the arm has caught up with the leader, who went on meanwhile."""
         if self._stream is None or not self._is_behind:
             return angles
         step = self.config.approach_speed / self.config.fps

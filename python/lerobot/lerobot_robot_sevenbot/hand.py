@@ -42,7 +42,7 @@ class Hand:
             simulation.hold_by_hand(joint)
 
     def lead(self) -> None:
-        """Brings the joints to where they are at this time."""
+        """Moves the joints to the angles of the hand at this time."""
         now = time.monotonic()
         self._start = self._start or now
         for joint, angle in enumerate(self.angles(now - self._start), start=1):

@@ -64,7 +64,7 @@ def within_limits(angles: Iterable[float]) -> Angles:
 
 
 def within_step(angles: Iterable[float], before: Iterable[float], step: float) -> Angles:
-    """The angles, or where a joint would change by more than a step of degrees, that step."""
+    """The angles, with the change of each joint limited to `step` degrees."""
     return [min(max(angle, last - step), last + step) for angle, last in zip(angles, before, strict=True)]
 
 

@@ -18,7 +18,7 @@ from .warned import Warned
 HEALTH_PERIOD = 0.1
 """Seconds between two looks at the health of the arm."""
 SILENT = ("no answer", "no servo answers")
-"""The problems of an arm that is led by hand."""
+"""The kinds of problems that matter while the motors are off."""
 
 
 class SevenbotLeader(Device, Teleoperator):
@@ -78,13 +78,13 @@ class SevenbotLeader(Device, Teleoperator):
         return joints.to_lerobot("pos", joints.within_limits(map(float, self._positions(connection))))
 
     def _check_health(self, arm: sevenbot.Arm) -> None:
-        """A servo that does not answer keeps its last position, and motors that drive the joints work against the hand."""
+        """Raises `ConnectionError` if a servo stays silent, so that its position is old, or if the motors drive the joints."""
         if time.monotonic() < self._next_check:
             return
         self._next_check = time.monotonic() + HEALTH_PERIOD
         status = arm.status()
         if status is None:
-            # The maker's firmware does not tell it.
+            # The maker's firmware has no status.
             return
         silent = [problem for problem in status.problems if problem.kind in SILENT]
         if silent:

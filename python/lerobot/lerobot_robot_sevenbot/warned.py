@@ -10,7 +10,7 @@ LOGGER = logging.getLogger(__package__)
 QUIET = 3.0
 """A problem that was not there for this time, in seconds, is told again when it comes back."""
 PASSING = ("blocked", "let go")
-"""What a loop goes on with: the joint takes up the stream by itself once it is free."""
+"""The kinds of problems that do not end the loop: the joint takes up the stream by itself once it is free."""
 SILENCE = 0.5
 """A servo that does not answer for this time, in seconds, ends the loop. A shorter silence is a disturbance of its bus."""
 GAP = 0.3
@@ -31,7 +31,7 @@ class Warned:
         self.problems(error.problems, error)
 
     def problems(self, problems: Iterable[sevenbot.Problem], error: Exception) -> None:
-        """As `problem`, of these problems."""
+        """As `problem`, for these problems. Raises `error` if no loop can go on with one of them."""
         now = time.monotonic()
         for problem in problems:
             begin, last = self._problems.get(str(problem), (now, -QUIET))

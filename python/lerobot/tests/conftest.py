@@ -15,7 +15,7 @@ if not HAS_TORCH:
 
 @pytest.fixture(autouse=True)
 def calibration_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """LeRobot makes a folder for calibrations: not in the home of whoever runs the tests."""
+    """Lets LeRobot make its folder for calibrations in a temporary folder, not in the home of the user."""
     for module in ("lerobot.robots.robot", "lerobot.teleoperators.teleoperator"):
         monkeypatch.setattr(f"{module}.HF_LEROBOT_CALIBRATION", tmp_path / "calibration")
 

@@ -1,4 +1,4 @@
-//! Calls of several methods of `Arm`.
+//! The work of methods of `Arm` that takes more than one step.
 
 use std::sync::{Arc, Mutex};
 
@@ -25,7 +25,7 @@ impl Arm {
         Self { worker: Arc::new(worker), simulation, sent: Mutex::new(None), opened }
     }
 
-    /// Starts a move, and waits for it.
+    /// Starts a move. If `wait`, waits for its end and returns the measured angles; otherwise returns `None`.
     pub(super) fn go(
         &self,
         py: Python<'_>,
@@ -41,7 +41,7 @@ impl Arm {
         if wait { self.wait(py) } else { Ok(None) }
     }
 
-    /// Starts a move of the tip, if the guard allows the way, and waits for it.
+    /// Starts a move of the tip, if the guard allows the way. Waits and returns as [`Self::go`] does.
     pub(super) fn go_to_tip(
         &self,
         py: Python<'_>,
@@ -74,7 +74,7 @@ impl Arm {
         breach.map_or(Ok(()), |breach| warn_of(py, &breach))
     }
 
-    /// Plans a straight line, and plays it.
+    /// Plans a straight line, plays it, and returns the measured angles. Fails if `wait` is false.
     pub(super) fn move_straight(
         &self,
         py: Python<'_>,
@@ -101,7 +101,8 @@ impl Arm {
         Ok(raised(py, parked)?.map_err(|why| file_error(py, &path, &why))?.into())
     }
 
-    /// Records until the time is over, or Ctrl-C ends a recording without a limit.
+    /// Records until the time is over, or Ctrl-C ends a recording without a limit. Another failure gets the moments before it as
+    /// its attribute `recording`.
     pub(super) fn record_moments(&self, py: Python<'_>, options: RecordOptions) -> PyResult<Recording> {
         let work = move |arm: &mut sevenbot::Arm, watch: &mut Watch<'_>| motion::record(arm, options, watch);
         let ((Recorded { text, arrivals }, outcome), signal) = self.worker.call_until_signal(py, work)?;
@@ -120,7 +121,7 @@ impl Arm {
         }
     }
 
-    /// Makes a moving arm hold, and closes the port.
+    /// Interrupts calls of other threads, makes a moving arm hold, and closes the port. Does nothing if the port is closed.
     pub(super) fn hold_and_close(&self, py: Python<'_>) -> PyResult<()> {
         if !self.worker.is_open() {
             return Ok(());
@@ -132,7 +133,8 @@ impl Arm {
         held.and_then(|held| raised(py, held))
     }
 
-    /// Plays a recording after it was checked, and returns the measured one.
+    /// Checks the speeds of a recording, warns if it leaves the guard, and plays it. Returns the recording of the measured
+    /// positions.
     pub(super) fn play_guarded(
         &self,
         py: Python<'_>,
@@ -150,7 +152,7 @@ impl Arm {
         self.play_moments(py, moments.clone(), options)
     }
 
-    /// Plays a recording, and returns the measured one.
+    /// Plays a recording. Returns the recording of the measured positions.
     pub(super) fn play_moments(
         &self,
         py: Python<'_>,

@@ -48,7 +48,7 @@ fn in_python(hint: &str) -> String {
     hint.replace("(--baud)", "(baud=)").replace("SEVENBOT_TOKEN set", "SEVENBOT_TOKEN or token= set")
 }
 
-/// A port that does not open, with its name.
+/// The exception for a port that does not open. Its message begins with the name of the port.
 pub(crate) fn not_opened(py: Python<'_>, port: &str, why: &OpenError) -> PyErr {
     let hints: Vec<String> = advice::opening(port, why).iter().map(|hint| in_python(hint)).collect();
     let message = format!("{port}: {why}");
@@ -243,7 +243,7 @@ impl Raise for ValueError {
     }
 }
 
-/// Raises the error of a result.
+/// The value of a result, or its error as an exception.
 pub(crate) fn raised<T, E: Raise>(py: Python<'_>, result: Result<T, E>) -> PyResult<T> {
     result.map_err(|error| error.raise(py))
 }

@@ -44,7 +44,7 @@ class Joint:
         self.of, self.factor = get("mimic", "joint"), float(get("mimic", "multiplier", "1"))
 
     def frame(self, angle: float) -> Matrix:
-        """From the child's axes to those of the parent."""
+        """The transform from the child's axes to the parent's axes."""
         x, y, z = self.axis
         cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
         frame = np.eye(4)
@@ -76,7 +76,7 @@ class Robot:
         self._frames: dict[str, Matrix] = {}
 
     def random_pose(self, generator: np.random.Generator) -> dict[str, float]:
-        """Within all limits."""
+        """A random pose within all limits."""
         while True:
             pose = {joint.name: generator.uniform(joint.low, joint.high) for joint in self.joints if not joint.of}
             if abs(np.degrees(pose["joint_2"] + pose["joint_3"])) <= LINKAGE:
@@ -102,7 +102,7 @@ class Robot:
         return bool(found)
 
     def neighbours(self) -> set[frozenset[str]]:
-        """Links that one joint joins, or several of which only one moves the shape: the links between have no shape."""
+        """The pairs of a link and its nearest ancestor that has a shape. Links between the two have no shape."""
         parents = {joint.child: joint.parent for joint in self.joints}
 
         def before(link: str) -> str:

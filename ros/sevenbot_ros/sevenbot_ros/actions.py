@@ -1,4 +1,4 @@
-"""What the services do. Each call takes its time, and the arm is measured meanwhile.
+"""What the services do. A call returns when its work is done. The thread of the driver measures the arm meanwhile.
 
 Knows no ROS.
 """
@@ -40,7 +40,7 @@ def hold(driver: Driver) -> str:
 
 
 def home(driver: Driver) -> str:
-    """Move to the standard pose. Paced by the thread of the driver, so that a simulated arm takes its time, too."""
+    """Move to the standard pose, then restore the speeds. The driver's thread lets time pass, also for a simulated arm."""
     with driver.motion() as arm:
         speeds = arm.get("speed")
         try:

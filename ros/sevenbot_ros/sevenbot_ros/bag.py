@@ -30,7 +30,7 @@ TOPICS: tuple[tuple[str, Any, str, Any], ...] = (
 
 
 class Recorder:
-    """Writes what it hears, as it was on the wire."""
+    """Writes the messages of `TOPICS` into a bag, serialised as they were received."""
 
     def __init__(self, node: Node, folder: Path) -> None:
         from rosbags.rosbag2 import StoragePlugin, Writer

@@ -7,7 +7,7 @@ from typing import Protocol
 
 import sevenbot
 
-# If the simulated clock is further ahead of real time or behind it than this, in seconds, it is rebased and does not catch up.
+# If simulated time differs from real time by more than this, in seconds, the clock is rebased and does not catch up.
 LEAP = 0.3
 # The shortest sleep, in seconds.
 STEP = 1e-5
@@ -38,8 +38,7 @@ class RealClock:
 class SimulatedClock:
     """Virtual time, led so that it passes `factor` times as fast as real time.
 
-    Virtual time passes by itself while the arm is asked. A busy machine makes it slower, never uneven: it does not hurry
-    afterwards.
+    Virtual time passes by itself while the arm is asked. If a busy machine delays it by more than `LEAP`, it does not catch up.
     """
 
     def __init__(self, arm: sevenbot.SimulatedArm, factor: float = 1.0) -> None:

@@ -42,7 +42,7 @@ class Rules:
 def check(
     rules: Rules, names: Sequence[str], positions: Sequence[float], stamp: float | None, now: float
 ) -> Targets | Refusal:
-    """Targets of a command. `stamp` is `None` if the sender gave none."""
+    """The targets of a command, or the reason why it is refused. `stamp` is `None` if the sender gave none."""
     return _shape(names, positions) or _age(rules, stamp, now) or _targets(rules, names, positions)
 
 
@@ -101,7 +101,7 @@ def _radians(joint: int, degrees: float) -> str:
 
 
 def check_linkage(pose: Sequence[float]) -> Refusal | None:
-    """The targets of all joints together, in degrees of the arm."""
+    """Why the linkage does not allow the targets of all joints, in degrees of the arm; `None` if it does."""
     if linkage_is_kept(pose):
         return None
     total = math.radians(pose[1] - to_degrees(1, 0.0) + pose[2] - to_degrees(2, 0.0))
@@ -120,7 +120,7 @@ class Throttle:
         self._held: dict[str, int] = {}
 
     def pass_(self, key: str, now: float) -> int | None:
-        """`None`: hold it back. Else it passes, and this many of its kind were held back before it."""
+        """`None` if the message is held back. Otherwise the number of messages of this kind that were held back before."""
         last = self._last.get(key)
         if last is not None and 0.0 <= now - last < self._period:
             self._held[key] = self._held.get(key, 0) + 1

@@ -58,7 +58,7 @@ def _set_mesh(link: Xml.Element, meshes: str) -> None:
 
 
 def _add_claw(robot: Xml.Element, meshes: str) -> None:
-    """Joint 7 turns an empty link, because a finger turns by half of its angle."""
+    """Adds joint 7 and the fingers. Joint 7 turns an empty link, because each finger turns by half of the joint's angle."""
     _add_joint(robot, "joint_7", "tip", "claw", (0.0, 0.0), CLAW_MAX)
     ahead, aside = FINGER_AXIS
     for (name, of, factor), link, side in zip(PASSIVE[1:], FINGERS, (aside, -aside), strict=True):

@@ -60,7 +60,7 @@ class Driver:
 
     @property
     def measurement(self) -> Measurement | None:
-        """The last one; `None` while no arm answers."""
+        """The last measurement; `None` while no arm answers."""
         monitor = self._monitor
         return None if monitor is None else monitor.last
 
@@ -73,7 +73,7 @@ class Driver:
         return self._clock.now()
 
     def standing(self) -> tuple[float, ...]:
-        """Where the joints stand, or the last point of the stream, in degrees of the arm."""
+        """The last point of the stream, or without a stream the targets of the joints, in degrees of the arm."""
         lead = self.leads.current
         return lead.point if lead is not None and lead.point is not None else opening.standing(self.arm())
 

@@ -11,7 +11,7 @@ from sevenbot_ros.health import Health
 
 @dataclass(frozen=True)
 class Measurement:
-    """Degrees of the arm, degrees a second, percent of the stall torque, and the greatest age in seconds."""
+    """Degrees of the arm, degrees per second, percent of the stall torque, the greatest age, and the time of the arm's clock."""
 
     positions: tuple[float, ...]
     velocities: tuple[float, ...]

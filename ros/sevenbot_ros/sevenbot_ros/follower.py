@@ -1,4 +1,4 @@
-"""From targets that come when they like to the points of a stream: who follows whom, and how far at once.
+"""Turns targets, which may come at any time, into the points of a stream. Limits how far a point may move.
 
 Knows neither ROS nor the arm. Angles are degrees of the arm.
 """
@@ -15,7 +15,7 @@ JOINTS = len(NAMES)
 
 
 class Jump(Enum):
-    """What a target that is far away does."""
+    """What happens to a target that is far from the last one."""
 
     REFUSE = "refuse"
     APPROACH = "approach"
@@ -44,11 +44,11 @@ class Follower:
 
     @property
     def is_approaching(self) -> bool:
-        """Is a target approached at the speed of the approach?"""
+        """True after the start and after a jump, until the points have reached the targets."""
         return self._is_approaching
 
     def take(self, targets: Targets) -> Refusal | None:
-        """Follow these targets from now on."""
+        """Follows these targets from now on. If it returns a refusal, the earlier targets stay."""
         goal = list(self._goal)
         for joint, angle in targets.degrees.items():
             goal[joint] = angle

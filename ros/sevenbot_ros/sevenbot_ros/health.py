@@ -1,7 +1,6 @@
 """The health of the arm as a diagnosis: a level, a sentence and values.
 
-Knows neither ROS nor the arm, only the values of the registers 192 to 199 and 241 to 255, or the exception that ended the
-connection.
+Knows neither ROS nor the arm, only the values of the registers in `BLOCKS`, or the reason why the arm does not answer.
 """
 
 from __future__ import annotations
@@ -10,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 
-# A servo switches itself off at 80 degrees Celsius. From this temperature on there is a warning.
+# The temperature in degrees Celsius from which on there is a warning. A servo switches itself off at 80.
 HOT = 65
 # The names of register 29.
 MOTOR_STATES = ("damping protection", "servo", "forceless")
@@ -42,7 +41,7 @@ def joints_of(bits: int) -> list[int]:
 
 
 def lost(reason: str) -> Health:
-    """The arm does not answer."""
+    """The health of an arm that does not answer."""
     return Health(Level.ERROR, f"no arm: {reason}", {})
 
 

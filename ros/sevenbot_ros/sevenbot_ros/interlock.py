@@ -1,4 +1,4 @@
-"""May the arm move? It has to be connected, not stopped, and not used by a service.
+"""Decides whether commands may move the arm: it has to be connected, not stopped, and not used by a service.
 
 Knows neither ROS nor the stream. All threads call it.
 """
@@ -32,7 +32,7 @@ class Interlock:
         self._actions = self._motions = self._stops = 0
 
     def connect(self, arm: sevenbot.Arm | None) -> None:
-        """This arm answers, or none does."""
+        """Sets the arm that answers; `None`: no arm answers."""
         with self.lock:
             self._arm = arm
 
@@ -44,7 +44,7 @@ class Interlock:
         return arm
 
     def refusal(self) -> Refusal | None:
-        """Why a command is refused."""
+        """Why a command is refused now; `None` if it is not refused."""
         with self.lock:
             if self._arm is None:
                 return Refusal("no arm", "no arm answers")
@@ -61,7 +61,7 @@ class Interlock:
 
     @property
     def is_stopping(self) -> bool:
-        """Does a stop watch whether the arm holds?"""
+        """Is a stop still at work, which makes the arm hold and watches whether it does?"""
         return self._stops > 0
 
     def halt(self, reason: str) -> None:
@@ -91,13 +91,16 @@ class Interlock:
             raise Halted(_until_hold(halted))
 
     def wait(self, seconds: float) -> None:
-        """Waits this long. Raises `Halted` as soon as commands are refused until `hold`."""
+        """Waits this long, at most until a stop. Then raises `Halted` if commands are refused until `hold`."""
         with self.lock:
             self.lock.wait_for(lambda: self._halted is not None, seconds)
         self.check_halted()
 
     def stop(self, reason: str) -> list[int]:
-        """Makes the arm hold at once, also in the middle of a stream, and refuses commands for this reason."""
+        """Makes the arm hold at once, also in the middle of a stream, ends all motions, and refuses commands for this reason.
+
+        Returns the targets in degrees.
+        """
         arm = self.arm()
         with self.lock:
             self._halted = reason
@@ -112,7 +115,7 @@ class Interlock:
                 self._stops -= 1
 
     def _end_motions(self, arm: sevenbot.Arm) -> None:
-        """Holds until the motions have ended that were allowed before the stop: each may write its first target after a hold."""
+        """Repeats the hold until all motions have ended: one that began before the stop may write a target after a hold."""
         while self._motions:
             # The hold after this loop reports what is wrong.
             with suppress(sevenbot.Error):
@@ -132,7 +135,7 @@ class Interlock:
 
     @contextmanager
     def motion(self) -> Iterator[None]:
-        """What a service does in here moves the arm, and every `stop` ends it. Raises `Halted` if commands are refused."""
+        """The context of a service that moves the arm. Every `stop` ends the motion. Raises `Halted` if commands are refused."""
         with self.lock:
             self.check_halted()
             self._motions += 1

@@ -26,17 +26,17 @@ STALL_TORQUE = 2.0
 
 
 def to_radians(degrees: Sequence[float]) -> list[float]:
-    """The angles of the model from those of the arm."""
+    """Converts angles of the arm in degrees to angles of the model in radians."""
     return [math.radians(angle - zero) for angle, zero in zip(degrees, ZEROS, strict=True)]
 
 
 def to_degrees(joint: int, radians: float) -> float:
-    """The angle of the arm from that of the model. `joint` counts from 0."""
+    """Converts an angle of the model in radians to the angle of the arm in degrees. `joint` counts from 0."""
     return math.degrees(radians) + ZEROS[joint]
 
 
 def speeds_to_radians(degrees: Sequence[float]) -> list[float]:
-    """Speeds have no zero."""
+    """Converts degrees per second to radians per second, for arm and model alike."""
     return [math.radians(speed) for speed in degrees]
 
 
@@ -60,7 +60,7 @@ class Limits:
         return cls(low, (*high[:6], min(high[6], CLAW_MAX)))
 
     def within(self, low: Sequence[float], high: Sequence[float]) -> Limits:
-        """A tighter range, from parameters in radians; an empty list leaves a side."""
+        """These limits, tightened by angles of the model in radians. An empty list leaves a side as it is."""
         lows = [to_degrees(joint, angle) for joint, angle in enumerate(low)] or self.low
         highs = [to_degrees(joint, angle) for joint, angle in enumerate(high)] or self.high
         return Limits(

@@ -32,7 +32,7 @@ class Lead(Protocol):
         """The angles of all joints at the last point; `None` before the beginning."""
 
     def begin(self, standing: Sequence[float]) -> None:
-        """The stream begins, and the joints stand there."""
+        """Called when the stream begins. `standing` is where the joints stand."""
 
     def next(self, steps: int, measurement: Measurement | None) -> list[float | None] | None:
         """The point this many periods after the last one, 0 for the first. `None` ends the stream."""
@@ -41,7 +41,7 @@ class Lead(Protocol):
         """What was refused since the last call."""
 
     def end(self, reason: str) -> None:
-        """The stream ends for this reason, unless it ended by itself."""
+        """Called when the stream ends for this reason. Has no effect if the lead has ended by itself."""
 
     def gives_way_to(self, other: Lead) -> bool:
         """May this one end so that the other leads the arm?"""
@@ -60,7 +60,7 @@ class CommandLead:
         self.point: tuple[float, ...] | None = None
 
     def command(self, targets: Targets) -> None:
-        """Follow these targets. All that came since the last point are looked at, because each is near the one before it."""
+        """Follows these targets. The next point checks all targets since the last point, because each is near the one before."""
         with self._lock:
             self._pending = [*self._pending, targets][-LONGEST_QUEUE:]
 

@@ -19,7 +19,7 @@ class LeadSlot:
         self._lead: Lead | None = None
 
     def command(self, targets: Targets) -> Refusal | None:
-        """Follow these targets. Other refusals, such as that of a jump, come as an event."""
+        """Follows these targets, or returns why commands are refused. Refusals of a target, such as a jump, come as events."""
         with self._interlock.lock:
             if refusal := self._interlock.refusal():
                 return refusal
@@ -31,7 +31,7 @@ class LeadSlot:
             return None
 
     def lead(self, lead: Lead) -> Refusal | None:
-        """Be led by this from the next point on."""
+        """Lets this lead the arm from the next point on, and ends the lead before it. Returns a reason if this is refused."""
         with self._interlock.lock:
             if refusal := self._interlock.refusal():
                 return refusal
@@ -48,7 +48,7 @@ class LeadSlot:
         return self._lead
 
     def allowed(self) -> Lead | None:
-        """What leads the arm. Ends it if the interlock refuses commands by now."""
+        """What leads the arm; `None` if nothing does. If the interlock refuses commands now, ends the lead and returns `None`."""
         with self._interlock.lock:
             lead, refusal = self._lead, self._interlock.refusal()
             if refusal is not None:
@@ -58,7 +58,7 @@ class LeadSlot:
         return lead if refusal is None else None
 
     def end(self, lead: Lead | None, reason: str) -> None:
-        """Ends this lead, unless another one leads meanwhile."""
+        """Ends this lead, and empties the slot unless another lead is in it."""
         if lead is None:
             return
         lead.end(reason)

@@ -28,7 +28,7 @@ def seconds(message: Time | Duration) -> float:
 
 
 def stamp(seconds: float) -> Time:
-    """A time of ROS."""
+    """Converts seconds to a time of ROS."""
     whole = math.floor(seconds)
     return Time(sec=whole, nanosec=min(round((seconds - whole) * 1e9), 999_999_999))
 

@@ -46,7 +46,7 @@ class Monitor:
         self._events.measured(self.last)
 
     def _examine(self) -> None:
-        """Reads one block of the health, and tells it after the last one: a longer read would delay a point of the stream."""
+        """Reads one block of the health, and tells the health after the last one. A longer read would delay the stream."""
         self._blocks.append(self._arm.get(health.BLOCKS[len(self._blocks)]))
         if len(self._blocks) < len(health.BLOCKS):
             return
@@ -58,6 +58,6 @@ class Monitor:
 
 
 def _next(due: float, period: float, now: float) -> float:
-    """The next time on the grid that is not past."""
+    """A period after `due`, or `now` if that is past."""
     due += period
     return due if due > now else now

@@ -39,7 +39,7 @@ def _quality(depth: int, *, reliable: bool, latched: bool = False) -> QoSProfile
 
 
 class ArmNode(Node):
-    """An arm as a robot of ROS. `start` it after the executor has it."""
+    """An arm as a robot of ROS. Call `start` after the node was added to an executor."""
 
     def __init__(self, name: str = "sevenbot") -> None:
         super().__init__(name)

@@ -17,7 +17,7 @@ SPEED = 60
 
 
 def open_arm(settings: Settings) -> tuple[sevenbot.Arm, Clock]:
-    """An arm and its clock. Raises a `sevenbot.Error`."""
+    """Opens an arm, and returns it with its clock. Raises `sevenbot.Error`."""
     if settings.port == SIMULATOR:
         simulated = sevenbot.Arm.simulated(settings.seed)
         simulated.sleep(START_UP)
@@ -36,7 +36,7 @@ def open_arm(settings: Settings) -> tuple[sevenbot.Arm, Clock]:
 
 
 def standing(arm: sevenbot.Arm) -> tuple[float, ...]:
-    """The targets of the joints in degrees: where they stand, but for what a load bends."""
+    """The targets of the joints in degrees. The joints stand there, apart from the bending under load."""
     status = arm.status()
     if status is None:
         raise sevenbot.NotServed("streams need the firmware of this project")

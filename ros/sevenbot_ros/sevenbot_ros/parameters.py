@@ -41,7 +41,7 @@ class WrongParameter(ValueError):
 
 
 def declare(node: Node) -> None:
-    """Declares all of them, read only, so that a change at run time is refused rather than ignored."""
+    """Declares all parameters as read only, so that a change at run time is refused rather than ignored."""
     for name, default, meaning in DECLARED:
         descriptor = ParameterDescriptor(description=meaning, read_only=True)
         # On a command line `1` is an integer, also where a float is expected, and a chip id may look like a number.
@@ -50,7 +50,7 @@ def declare(node: Node) -> None:
 
 
 def settings(node: Node) -> Settings:
-    """Raises `WrongParameter`."""
+    """The settings that the parameters make. Raises `WrongParameter` if one is out of range."""
 
     def value(name: str) -> object:
         return node.get_parameter(name).value

@@ -29,7 +29,7 @@ class Streamer:
     def __init__(self, settings: Settings, interlock: Interlock, leads: LeadSlot, events: Events) -> None:
         self._settings, self._interlock, self._leads, self._events = settings, interlock, leads, events
         self._stream: sevenbot.Stream | None = None
-        # What leads the open stream, and how many periods it was late at its last point.
+        # What leads the open stream, and the number of periods from the last point but one to the last point.
         self._led: Lead | None = None
         self._skipped = 1
         self._next_point = 0.0
@@ -46,7 +46,7 @@ class Streamer:
         return math.inf if self._stream is None else self._next_point - MARGIN
 
     def advance(self, arm: sevenbot.Arm, clock: Clock, measurement: Measurement | None) -> None:
-        """Sends a point if one is due."""
+        """Sends a point if one is due. Opens the stream when something leads the arm, and closes it when nothing does."""
         lead = self._leads.allowed()
         if lead is None:
             self._close_if_idle()
@@ -128,7 +128,8 @@ class Streamer:
                 self._interlock.lock.notify_all()
 
     def wait_until_closed(self) -> None:
-        """For other threads, while the interlock refuses commands. Raises `sevenbot.Interrupted` if the stream does not end."""
+        """Waits until no stream is open. For other threads, while the interlock refuses commands. Raises `sevenbot.Interrupted`
+        if the stream does not end within `LONGEST_END`."""
         with self._interlock.lock:
             if not self._interlock.lock.wait_for(lambda: self._stream is None, LONGEST_END):
                 raise sevenbot.Interrupted("the stream does not end")

@@ -51,7 +51,7 @@ class Trajectory:
         return [pose[joint] if joint in self.joints else None for joint in range(len(NAMES))]
 
     def pose(self, time: float) -> tuple[float, ...]:
-        """The angles of all joints at a time: the ends before the first point and after the last one."""
+        """The angles of all joints at a time. Before the first point and after the last one, the angles of that point."""
         index = bisect_right(self._times, time)
         if index == 0:
             return self._knots[0].pose

@@ -131,7 +131,7 @@ class TrajectoryAction:
         )
 
     def _accept(self) -> GoalResponse:
-        """Each goal takes a thread of the executor until it ends."""
+        """Accepts a goal if fewer than `TRAJECTORIES` are at work: each takes a thread of the executor until it ends."""
         with self._lock:
             if self._goals == TRAJECTORIES:
                 self._node.refused(Refusal("goals", f"{TRAJECTORIES} goals are running or wait: cancel one first"))
@@ -198,7 +198,10 @@ class TrajectoryAction:
         return driver.leads.lead(lead) or lead
 
     def _wait_for(self, start: float, handle: ServerGoalHandle) -> Refusal | None:
-        """Waits until this time, 0 for now. Where the joints stand then is where the trajectory has to begin."""
+        """Waits until the start of a goal, because the trajectory has to begin where the joints stand then. 0 is now.
+
+        Returns the reason if the goal is refused.
+        """
         driver = self._node.driver
         if start and self._node.seconds() - start > driver.settings.rules.max_age:
             return Refusal("old", f"the trajectory began {self._node.seconds() - start:.2f} s ago")

@@ -1,4 +1,5 @@
-//! Every command under every fault of the simulator: no command reports success unless the arm did what was asked.
+//! Each command of the table under each fault of the table: no command reports success unless the arm did what was asked. A
+//! second test checks what the monitor shows when the arm cannot obey a key.
 //!
 //! This is a test program of its own, because it starts 24 arms at a time, and because what a command notices of a short
 //! fault depends on how busy the machine is.

@@ -1,4 +1,5 @@
-//! Counts the instructions of kinematics: the largest count over many poses.
+//! Counts the instructions of kinematics: the largest count over many poses. Also checks that the results have the same bits
+//! as on the host.
 
 #![no_std]
 #![no_main]

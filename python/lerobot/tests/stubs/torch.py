@@ -1,6 +1,6 @@
 """Names of torch for LeRobot's base classes, which mention them in annotations only.
 
-The wheels of torch are some gigabytes. What uses tensors is tested in the long step, with the real one.
+The wheels of torch are some gigabytes. The tests of LeRobot's commands use the real package, in the long step.
 """
 
 

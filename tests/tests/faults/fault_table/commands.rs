@@ -10,7 +10,7 @@ pub(crate) struct Command {
     pub(crate) arguments: &'static str,
     /// Writes before the command: the address of the first register, and the values from there on.
     pub(crate) before: &'static [(u8, &'static [u8])],
-    /// Virtual milliseconds between these writes and a fault that begins before the command, and from there to the command.
+    /// Virtual milliseconds from these writes to a fault that begins before the command, and from that fault to the command.
     pub(crate) pauses: (u64, u64),
     /// The angle of joint 2 at which the wall is, in degrees, if the fault is a wall.
     pub(crate) wall: u8,
@@ -42,7 +42,7 @@ pub(crate) enum Asked {
     Hold,
     /// To set a register.
     Register(u8, u8),
-    /// To write a recording whose last pose is that of the arm.
+    /// To write a recording whose last pose is the pose of the arm at the end of the command.
     Record,
 }
 
@@ -76,7 +76,7 @@ const fn still(arguments: &'static str, moment: Moment, asked: Asked) -> Command
     Command { arguments, before: &[], pauses, wall, is_supported: false, input: "", moment, notice, asked }
 }
 
-/// A command that moves an arm in the standard pose.
+/// A command that moves an arm, slowly, and by default from the standard pose.
 const fn moving(arguments: &'static str, moment: Moment, asked: Asked) -> Command {
     Command { before: &[SLOW], ..still(arguments, moment, asked) }
 }

@@ -1,4 +1,4 @@
-//! One cell of the table: a command, an arm with a fault, and what came of it.
+//! One cell of the table: a command on an arm with a fault, and its outcome.
 
 mod commands;
 mod faults;
@@ -24,7 +24,7 @@ use commands::{Asked, FILES};
 pub(crate) use commands::{COMMANDS, Command};
 pub(crate) use faults::{FAULTS, Fault};
 
-/// The arm has this virtual time to do what a command began, in milliseconds.
+/// Virtual milliseconds after the end of a command, in which the arm completes the move that the command began.
 const AFTERWARDS: u64 = 3_000;
 /// The servos take this virtual time to start, in milliseconds.
 const START_UP: u64 = 1_500;
@@ -33,7 +33,7 @@ const START_UP: u64 = 1_500;
 const USED: usize = 100;
 /// First of the fine targets.
 const FINE_TARGET: u8 = 128;
-/// A joint this near to an angle is there, in degrees: servos have play, and the arm bends.
+/// A joint has reached an angle if it is within this many degrees: servos have play, and the arm bends.
 const NEAR: f64 = 3.0;
 /// A joint that moves by less than this in [`AFTERWARDS`] stands still, in degrees.
 const STILL: f64 = 1.5;
@@ -50,7 +50,7 @@ const LONGEST: usize = 110;
 /// arm in motion moves on in between.
 const RECORDED: f64 = 8.0;
 
-/// What a command did.
+/// The outcome of a command.
 #[derive(Clone, Debug)]
 pub(crate) struct Cell {
     pub(crate) status: Option<i32>,

@@ -204,8 +204,8 @@ fn m04_m09_python_reads_reports() {
     });
 }
 
-/// A program of the other map has left its reports on. The first write of the next program ends them, so that it takes no
-/// report for an answer.
+/// A program of the other map has left its reports on. The first write of the next program ends them, so that the next
+/// program takes no report for an answer.
 #[test]
 fn m04_no_client_hears_the_other_maps_reports() {
     with_arm(TestSetup::any(), |arm| {
@@ -265,7 +265,8 @@ fn m03_m04_gui_page_shows_an_arm_that_is_moved_by_hand() {
     });
 }
 
-/// Blockly: polls one register after the other, writes speed and time of joint 1, and reads targets for angles.
+/// Blockly: polls one register after the other, writes speed and time of joint 1, and reads targets instead of measured
+/// angles.
 #[test]
 fn m01_m07_blockly_page() {
     with_arm(TestSetup::any(), |arm| {
@@ -290,7 +291,7 @@ fn m01_m07_blockly_page() {
     });
 }
 
-/// The reports of a program end when it closes the port, even if it was killed.
+/// When the port is closed, reports end, and offsets read again as before the first write (M5).
 #[test]
 fn m12_the_next_program_starts_afresh() {
     with_arm(TestSetup::any().needs(Need::SeesClosing), |arm| {

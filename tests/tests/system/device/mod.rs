@@ -1,4 +1,4 @@
-//! The device itself: frames and registers, with any arm.
+//! The device itself: frames, registers, motion, settings, servo faults, and the self-test image.
 
 mod maker_clients;
 mod motion;

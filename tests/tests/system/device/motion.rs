@@ -1,4 +1,4 @@
-//! Motion of the arm: `docs/protocol.md`, D9 to D14 and D18.
+//! Motion of the arm and reports of it: `docs/protocol.md`, D9 to D14, D17 and D18.
 //!
 //! A busy machine makes moves and reports slower, never faster, so the tests check the shortest time only. To show that
 //! something is fast, a test repeats it until it was fast once.
@@ -27,7 +27,7 @@ fn start_move(arm: &mut TestArm, address: u8, values: &[u8]) -> u8 {
     arm.write_and_read((address, values), (MOVING_JOINTS, 1))[0]
 }
 
-/// Moves joint 1 to an angle, and returns an upper bound of the time of its set-point.
+/// Moves joint 1 to an angle. Returns an upper bound of the time that its set-point took.
 fn time_move(arm: &mut TestArm, degrees: u8) -> Duration {
     let start = Instant::now();
     let moving = start_move(arm, TARGET_POSITION, &[degrees]);
@@ -259,7 +259,7 @@ fn receive_reports(arm: &mut TestArm, start: Instant, count: u32, hertz: u32) {
     assert_at_least(start.elapsed(), Duration::from_secs(1) * (count - 1) / hertz);
 }
 
-/// D14: reports have the requested frequency.
+/// D14: the frequency of reports does not exceed the requested one, and 0 stops them.
 #[test]
 fn d14_reports_have_their_frequency_and_stop_at_zero() {
     with_arm(TestSetup::any(), |arm| {

@@ -179,7 +179,7 @@ fn d16_values_without_effect_may_be_out_of_range() {
     });
 }
 
-/// D16, D17: one frame writes the largest value of every register.
+/// D16, D17: one frame writes registers 28 to 52, with the largest values of lock, effector, speeds and times.
 #[test]
 fn d17_a_frame_takes_effect_whole() {
     with_arm(TestSetup::any(), |arm| {
@@ -203,7 +203,7 @@ fn d20_the_pump_is_a_register() {
     });
 }
 
-/// Section 6: accepted reads and writes are counted, with the read of the counter itself.
+/// Section 6: accepted reads and writes are counted, including the read of the counter itself.
 #[test]
 fn accepted_frames_are_counted() {
     with_arm(TestSetup::any(), |arm| {

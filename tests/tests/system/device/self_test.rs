@@ -120,7 +120,7 @@ fn check_seven_servos(image: &mut SelfTest) {
     panic!("step d does not pass");
 }
 
-/// Reports that the test is skipped, unless the arm is the emulator.
+/// Is the test skipped, because `ARM` is not `emulator`? If so, prints the reason.
 fn is_skipped() -> bool {
     let is_skipped = env::var_os("ARM").is_none_or(|arm| arm != "emulator");
     if is_skipped {

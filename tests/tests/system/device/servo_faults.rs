@@ -1,4 +1,5 @@
-//! Faults of servos: the status block reports them, and the other joints continue. `docs/protocol.md`, D12 and section 6.
+//! Faults of servos: the status block reports them, and the other joints continue. `docs/protocol.md`, D12, D13, D27 and
+//! section 6.
 
 use std::thread::sleep;
 use std::time::Duration;
@@ -11,7 +12,7 @@ use system_tests::{TestArm, TestSetup, near, with_arm};
 
 /// The fault bit of the servo bus.
 const SERVO_BUS: u8 = 1 << 1;
-/// The index and the bit of joint 3, which has the faulty servo in all tests.
+/// The index and the bit of joint 3, which has the faulty servo in the tests of a single fault.
 const FAULTY: usize = 2;
 const FAULTY_BIT: u8 = 1 << FAULTY;
 
@@ -45,7 +46,7 @@ fn d12_a_missing_servo_is_reported_and_the_others_continue() {
     });
 }
 
-/// A servo with corrupted replies only is missing, and none of them changes its position.
+/// A servo whose replies are all corrupted counts as missing, and its replies do not change the measured position.
 #[test]
 fn a_garbled_servo_is_reported_and_its_position_does_not_change() {
     with_arm(TestSetup::any().fault("3=garbled"), |arm| {
@@ -105,8 +106,8 @@ fn d27_a_stuck_joint_reports_its_position_and_is_blocked() {
     });
 }
 
-/// Without protection a servo switches itself off. Its overload alarm lasts until its torque is off, so it shows that the
-/// motor states reach the servos (D13).
+/// Without protection a servo switches itself off. Its overload alarm lasts until its torque is off, so the end of the alarm
+/// shows that the motor states reach the servos (D13).
 #[test]
 fn d13_an_overload_alarm_ends_when_the_torque_is_off() {
     with_arm(TestSetup::any().fault("3=stuck"), |arm| {

@@ -98,7 +98,8 @@ fn d19_a_write_of_the_present_values_is_not_saved() {
     });
 }
 
-/// D19: there is room for at least 600 saves. Then settings are refused and kept, and a restart makes room.
+/// D19: there is room for at least 600 saves. Then writes of settings are refused, the last accepted settings are kept, and a
+/// restart makes room.
 #[test]
 fn d19_a_full_storage_refuses_settings_and_keeps_the_last() {
     with_arm(TestSetup::any().needs(Need::ExpendableStorage).needs(Need::PowerCycle), |arm| {

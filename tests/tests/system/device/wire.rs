@@ -162,7 +162,7 @@ fn d04_a_false_header_delays_a_good_frame_by_the_gap_only() {
             arm.send(&[FALSE_HEADER.as_slice(), &read_request(0, 1)].concat());
             assert_eq!(arm.reply().address, 0);
             let is_quick = start.elapsed() < Duration::from_millis(90);
-            // Past the timeout of the false header, for the next try.
+            // Wait until the false header has timed out, before the next try.
             sleep(Duration::from_millis(150));
             is_quick
         });
@@ -266,7 +266,6 @@ fn d06_writes_have_no_reply() {
     });
 }
 
-/// The sizes of the parts of a stream have no effect.
 #[test]
 fn frames_sent_byte_by_byte_have_the_same_replies() {
     with_arm(TestSetup::any(), |arm| {

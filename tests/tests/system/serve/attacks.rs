@@ -1,5 +1,5 @@
-//! Attacks on `sevenbot serve`. No attack moves the arm, keeps other programs out, or delays a stop. Each attack is bounded
-//! in count and time.
+//! Attacks on `sevenbot serve`: floods, requests of web pages, late targets and wrong tokens. Each attack is bounded in count
+//! and time. Other tests here check that the tool finds the server, and that refused programs learn why.
 
 use std::io::{Read, Write};
 use std::net::TcpStream;
@@ -142,7 +142,7 @@ fn what_was_sent_to_an_unplugged_arm_never_moves_it() {
     assert_eq!(target(&mut arm), 90);
 }
 
-/// The request of a web page: a simple POST with a frame for its body. Any local page may send it.
+/// HTTP requests with a frame as the body, such as the simple POST that any local page may send.
 #[test]
 fn a_web_page_does_not_reach_the_arm_through_a_port_for_frames() {
     let served = Served::start(1, &[]);
@@ -195,7 +195,7 @@ fn the_last_write_before_a_close_is_carried_out() {
     }
 }
 
-/// The other program goes on streaming. The arm does not follow it again until that program has paused.
+/// The other program goes on streaming, and the arm does not follow it.
 #[test]
 fn a_stop_ends_what_another_program_streams() {
     let served = Served::start(2, &[]);
@@ -280,7 +280,7 @@ fn each_wrong_token_makes_the_next_one_wait_longer() {
     assert!(start.elapsed() >= Duration::from_millis(3_100), "{:?}", start.elapsed());
 }
 
-/// Five wrong tokens: the next one of this address is checked after 1.6 s.
+/// Five wrong tokens: the server checks the next token from this address after 1.6 s.
 fn guess_tokens(served: &Served) {
     for _ in 0..5 {
         let mut stream = served.connect();

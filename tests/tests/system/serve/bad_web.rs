@@ -58,7 +58,7 @@ fn a_flood_of_messages_keeps_no_other_from_its_replies() {
         let mut writer = flood.try_clone().expect("a second handle");
         let bytes = web_frame(kind, message).repeat(10);
         let flooding = thread::spawn(move || while writer.write_all(&bytes).is_ok() {});
-        // Its answers are read, so that it does not have to wait for room.
+        // Read the answers to the flood, so that the flood never waits for room.
         let mut reader = flood.try_clone().expect("a second handle");
         let reading =
             thread::spawn(move || while reader.read(&mut [0; 4_096]).is_ok_and(|count| count > 0) {});

@@ -1,4 +1,4 @@
-//! `sevenbot class`: who gets in, a stop for all, and the real arm for one pupil at a time.
+//! `sevenbot class`: access and names, messages and stops for all, and the real arm for one pupil at a time.
 
 use std::io::{Read, Write};
 use std::net::TcpStream;
@@ -12,7 +12,7 @@ use tungstenite::{Message, WebSocket};
 
 use super::class_tabs::{Class, Pupil, Tab};
 
-/// The class as the teacher's screen shows it once a condition holds.
+/// Waits until the class on the teacher's screen meets a condition, and returns the class.
 #[track_caller]
 fn shown(teacher: &mut Tab, holds: impl Fn(&Value) -> bool) -> Value {
     teacher.hear_where("class", holds)
@@ -144,7 +144,7 @@ fn strangers_keep_neither_the_teacher_nor_the_class_out() {
     assert!(strangers.len() >= 64, "{} strangers", strangers.len());
     let mut teacher = class.teacher();
     shown(&mut teacher, |class| class["pupils"] == json!([]));
-    // The server ends their connections after ten seconds, and a second more because they do not close them.
+    // The server ends the strangers' connections after ten seconds, and one second for each to close its end.
     let mut mia = wait_for("a place", || class.try_join("Mia").ok_or_else(|| "the class is full".to_owned()));
     mia.tab.hear("ask");
     shown(&mut teacher, |class| tile(class, "Mia")["presence"] == "here");
@@ -191,7 +191,7 @@ fn a_stop_for_all_is_repeated_until_the_last_tab_has_confirmed_it() {
             pupil.tab.say(&json!({ "stopped": { "number": number, "outcome": "holds" } }));
         }
     }
-    // The real arm counts, too.
+    // Seven have to confirm: six tabs and the real arm.
     let late = shown(&mut teacher, |class| class["stop"]["confirmed"] == 6);
     assert_eq!((&late["stop"]["asked"], &tile(&late, "Pupil 4")["stop"]), (&json!(7), &json!("asked")));
     assert_eq!((&late["arm"]["stop"], &tile(&late, "Pupil 1")["stop"]), (&json!("holds"), &json!("holds")));

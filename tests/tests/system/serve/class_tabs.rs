@@ -32,7 +32,7 @@ pub(crate) struct Class {
 }
 
 impl Class {
-    /// Needs a program that was built with the page.
+    /// Starts a class, without a code if `code` is empty. Needs a `sevenbot` that was built with the page.
     pub(crate) fn start(has_arm: bool, code: &str) -> Self {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let simulator = has_arm.then(|| simulator(folder.path()));
@@ -90,7 +90,7 @@ impl Class {
         }
     }
 
-    /// A tab of a pupil, which says nothing yet.
+    /// A tab of a pupil who has not joined yet.
     pub(crate) fn tab(&self) -> Tab {
         Tab::new(self.socket(&format!("/class?token={}", self.code), &[]).expect("accepted"))
     }

@@ -1,4 +1,5 @@
-//! The last frames on the arm's line, and when it was unplugged. They tell why a reply is missing.
+//! The last reads and replies on the arm's line, and the times of outages. A failed test prints them, to show why a reply is
+//! missing.
 
 use std::collections::VecDeque;
 use std::sync::Mutex;
@@ -24,7 +25,7 @@ struct Read {
 #[derive(Default)]
 pub(crate) struct LineHistory {
     reads: Mutex<VecDeque<Read>>,
-    /// Each outage has two: when it began, and when the arm was seen to answer again.
+    /// Two times for each outage: when it began, and when the arm answered again.
     turns: Mutex<Vec<Instant>>,
 }
 
@@ -44,7 +45,7 @@ impl LineHistory {
         reads.push_back(Read { at: Instant::now(), is_reply, address, count });
     }
 
-    /// The reads and replies of the last seconds, and the last one of each.
+    /// The numbers of reads and replies in [`LATELY`], and the age of the last one of each.
     pub(crate) fn of_late(&self) -> String {
         let reads = self.reads.lock().expect("no panic");
         let of_kind = |is_reply: bool| {

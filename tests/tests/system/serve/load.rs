@@ -1,6 +1,6 @@
 //! Ten programs of three kinds share one arm in real time: each reply reaches the program that asked for it.
 //!
-//! The length is `SERVE_LOAD_SECONDS`. A quarter of an hour:
+//! The test lasts `SERVE_LOAD_SECONDS`, by default 5 s. A quarter of an hour:
 //!
 //! ```sh
 //! SERVE_LOAD_SECONDS=900 cargo nextest run -p system-tests --test system serve::load --no-capture
@@ -23,7 +23,7 @@ use super::served::{LOCAL_PAGE, Served, WebClient, names};
 
 /// A reply that has not come after this time is lost.
 const LOST: Duration = Duration::from_secs(30);
-/// Rate of the reports of present angles, in map 2.1.
+/// Register of the rate of angle reports in map 2.1. The reports hold the registers behind it.
 const ANGLE_FEEDBACK_FREQUENCY: u8 = 82;
 
 /// The most faults of a program that are described. After one crossed reply, all following replies are wrong, too.
@@ -86,7 +86,7 @@ impl AddAssign for Tally {
 /// A wire that carries frames.
 trait Wire: Send {
     fn send(&mut self, bytes: &[u8]);
-    /// The next frame; `None` if it is lost.
+    /// The next frame; `None` if none arrives within [`LOST`].
     fn frame(&mut self) -> Option<Vec<u8>>;
 }
 
@@ -114,7 +114,7 @@ impl Wire for TcpStream {
     }
 }
 
-/// The function code of a program's writes.
+/// The map that a program uses: it decides the function code of writes, and the registers and form of reports.
 #[derive(Clone, Copy)]
 enum Map {
     V22,

@@ -1,4 +1,4 @@
-//! Servers of the network: TLS, and names.
+//! Servers on the network: TLS, and names.
 
 use std::path::Path;
 use std::process::Output;
@@ -9,7 +9,8 @@ use system_tests::wait::wait_until;
 
 use super::served::Served;
 
-/// The tool connects with TLS and trusts the certificate of the user. The library and Python connect in the same way.
+/// The tool connects with TLS and trusts only the certificate in `SEVENBOT_CERTIFICATE`. The library and Python connect in the
+/// same way.
 #[test]
 fn the_tool_connects_with_tls_and_the_certificate_of_the_server() {
     let file =
@@ -35,7 +36,7 @@ fn the_tool_connects_with_tls_and_the_certificate_of_the_server() {
     assert!(said(missing).contains("SEVENBOT_CERTIFICATE"));
     let wrong = read("localhost", Some(&key));
     assert!(!wrong.status.success(), "{wrong:?}");
-    // The server is reachable at this address, too, but its certificate does not name it.
+    // The server is reachable at this address, too, but its certificate does not contain the address.
     let other = read("127.0.0.2", Some(&certificate));
     assert!(!other.status.success(), "{other:?}");
 }

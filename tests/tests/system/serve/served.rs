@@ -82,7 +82,7 @@ impl Served {
         std::fs::remove_file(self.folder.path().join("arm")).expect("a link");
     }
 
-    /// Plugs it in again.
+    /// Plugs the arm in again, with a relay that shows each frame to `watch`.
     pub(crate) fn plug(&mut self, watch: Watch) {
         self.relay = Some(plug(self.folder.path(), watch));
     }
@@ -142,7 +142,7 @@ pub(crate) fn names(count: usize) -> impl Iterator<Item = String> {
     ('a'..='z').chain('A'..='Z').take(count).map(String::from)
 }
 
-/// A relay between the simulator and the link that the server opens.
+/// Starts a relay to the simulator, and links `arm`, the port that the server opens, to the relay.
 fn plug(folder: &Path, watch: Watch) -> Relay {
     let relay = Relay::open_watched(&folder.join(SIMULATOR), watch);
     std::os::unix::fs::symlink(relay.path(), folder.join("arm")).expect("a link");
@@ -180,7 +180,7 @@ pub(crate) fn read_until(stream: &mut TcpStream, end: &[u8]) -> Vec<u8> {
     received
 }
 
-/// What a program sends to open the maker's WebSocket.
+/// The HTTP request that opens the maker's WebSocket.
 pub(crate) fn web_handshake(token: &str) -> String {
     format!(
         "GET /ws?token={token} HTTP/1.1\r\nHost: localhost\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n\
@@ -237,7 +237,7 @@ impl WebClient {
         self.0.get_ref().try_clone().expect("a second handle")
     }
 
-    /// The next message; `None` if the server has closed the connection.
+    /// The next message; `None` if the connection has ended, or the message is not JSON, such as a pong.
     pub(crate) fn receive(&mut self) -> Option<Value> {
         let message = self.0.read().ok()?;
         message.to_text().ok().and_then(|text| serde_json::from_str(text).ok())

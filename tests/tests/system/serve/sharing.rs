@@ -87,7 +87,7 @@ fn programs_of_both_maps_have_their_own_reports() {
     assert_eq!(old.register(FEEDBACK_FREQUENCY), 0, "stopped by a write of map 2.1");
 }
 
-/// A pseudo-terminal does not show which program sent a byte. The server notices a close only afterwards.
+/// A pseudo-terminal does not show which program sent a byte, and the server notices a close with a delay.
 #[test]
 fn the_next_program_on_a_terminal_does_not_wait_for_what_the_one_before_asked() {
     let asked = Arc::new(AtomicUsize::new(0));
@@ -110,9 +110,9 @@ fn the_next_program_on_a_terminal_does_not_wait_for_what_the_one_before_asked() 
     assert!(asked < 100, "{asked} of 200 long reads of the program that is gone");
 }
 
-/// The first program sends more than the server reads at once, so bytes wait in the kernel after it has closed the terminal.
-/// The server knows whose bytes they are only while the terminal is closed. A busy machine may not run the server in that time,
-/// so the test has several tries.
+/// The first program sends more than the server reads at once, so its bytes wait in the kernel after it has closed the
+/// terminal. The server can assign these bytes to the first program only while the terminal is closed. A busy machine may not
+/// run the server in that time, so the test has several tries.
 #[test]
 fn the_next_program_on_a_terminal_gets_no_reply_that_waited_in_the_kernel() {
     let served = Served::start(1, &[]);

@@ -15,7 +15,7 @@ use tungstenite::client::IntoClientRequest;
 use tungstenite::http::HeaderValue;
 use tungstenite::{Message, WebSocket};
 
-/// A simulator, and a server of the page.
+/// A server of the page, with a simulator as its arm or without an arm.
 struct Viewed {
     _server: RunningProgram,
     _simulator: Option<RunningProgram>,
@@ -26,7 +26,7 @@ struct Viewed {
 }
 
 impl Viewed {
-    /// Needs a program that was built with the page.
+    /// Starts `sevenbot view` with the port of a simulator, or with `--simulate`. Needs a program that was built with the page.
     fn start(has_arm: bool) -> Self {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let simulator = has_arm.then(|| simulator(folder.path()));

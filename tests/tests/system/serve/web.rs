@@ -44,7 +44,7 @@ fn a_page_gets_every_answer_in_order() {
     assert_eq!(next()["message"], "Invalid JSON format");
 }
 
-/// M5: the maker's two forms of offsets. Their bytes are out of range in function 06.
+/// M5: the maker's two forms of offsets. Function 06 would refuse some of their bytes, or take them for other offsets.
 #[test]
 fn a_write_has_the_forms_of_the_makers_map() {
     let served = Served::start(1, &[]);
@@ -81,7 +81,7 @@ fn programs_of_both_maps_read_the_same_offsets_in_their_own_forms() {
     assert_eq!((idle.read(OFFSET, 2), idle_web.read(OFFSET, 2)), (biased.to_vec(), biased.to_vec()));
     assert_eq!(connect(&served).read(OFFSET, 2), biased, "a new program");
     assert_eq!(old.read(OFFSET, 2), signed);
-    // What is read can be written back.
+    // A program can write back the bytes that it read.
     let read = old.read(OFFSET, 7);
     assert_eq!(old.write_and_read((OFFSET, &read), (OFFSET, 2)), signed);
     idle.send(&with_checksum(&[0xAA, 0x77, 4, 0, 0]));
@@ -129,7 +129,8 @@ fn a_page_moves_to_positions_and_learns_which_are_out_of_reach() {
     );
 }
 
-/// As with the maker's server, a position within reach engages the servos. One out of reach leaves the motor state.
+/// As with the maker's server, a position within reach engages the servos. A position out of reach does not change the motor
+/// state.
 #[test]
 fn a_position_within_reach_switches_to_the_servo_state() {
     let served = Served::start(1, &[]);

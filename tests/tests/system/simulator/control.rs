@@ -1,4 +1,5 @@
-//! `sevenbot sim`: faults, a hand, a weight and power of a running simulator, and clients that behave badly.
+//! `sevenbot sim`: faults, a hand, a weight, power and virtual time of a running simulator; its control socket, and clients
+//! that behave badly.
 
 use std::fs;
 use std::io::Write;
@@ -252,7 +253,7 @@ fn clients_that_behave_badly_disturb_neither_the_arm_nor_each_other() {
     flood.set_nonblocking(true).expect("a mode");
     let mut sent = 0;
     for _ in 0..1_000 {
-        // It never reads an answer.
+        // The flood never reads an answer.
         sent += (&flood).write(&b"{\"do\":\"state\"}\n".repeat(100)).unwrap_or(0);
         arm.register(EFFECTOR_TYPE);
     }

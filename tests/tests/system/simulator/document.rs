@@ -45,7 +45,7 @@ impl Terminals {
                 self.start_simulator(arguments)
             }
             ["sevenbot", arguments @ ..] => {
-                // A user needs time to type.
+                // Let virtual time pass, as it does while a user types.
                 output(self.in_folder(tool(), &["sim", "advance", "200ms"]));
                 output(self.in_folder(tool(), arguments))
             }
@@ -79,7 +79,7 @@ impl Terminals {
         }
     }
 
-    /// Sends a request to the control socket.
+    /// Sends a request to the control socket, and returns the answer. Starts a simulator if none is running.
     fn ask(&mut self, request: &str) -> String {
         if self.simulator.is_none() {
             self.start_simulator(&[]);
@@ -148,7 +148,7 @@ fn each_command_prints_what_the_page_shows() {
         if command.starts_with("host-sim --link") && shown.is_empty() {
             continue;
         }
-        // Three points stand for the other lines.
+        // `...` stands for the remaining lines.
         let is_cut = shown.last() == Some(&"...");
         let shown: Vec<String> =
             shown.iter().take(shown.len() - usize::from(is_cut)).map(|line| shape(line)).collect();

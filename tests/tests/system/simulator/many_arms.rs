@@ -140,7 +140,7 @@ fn a_client_that_does_not_read_delays_no_other_arm() {
     writer.join().expect("all was sent");
 }
 
-/// Two hundred arms are more than the inotify instances of a user (128), and need many open files under a low limit (256).
+/// Two hundred arms exceed the limit of inotify instances of a user (128), and their open files exceed the soft limit (256).
 #[test]
 fn two_hundred_arms_run_within_the_limits_of_a_user() {
     let mut command = Command::new("sh");

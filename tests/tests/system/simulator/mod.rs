@@ -1,4 +1,4 @@
-//! The simulator: many arms, its control socket and its document.
+//! The simulator: many arms, the control socket, snapshots, and the commands of its document.
 
 mod control;
 mod document;

@@ -8,7 +8,7 @@ use system_tests::registers::{DEVICE_ID, EEPROM_LOCK, PRESENT_POSITION, TARGET_P
 use system_tests::simulator::Simulator;
 use system_tests::wait;
 
-/// Moves joint 1, and returns the bytes of forty answers.
+/// Moves joint 1, and returns the positions of forty reads.
 fn movement(simulator: &Simulator) -> Vec<Vec<u8>> {
     let mut arm = simulator.client();
     arm.write(TARGET_POSITION, &[150]);

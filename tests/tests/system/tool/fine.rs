@@ -88,7 +88,8 @@ fn d22_d25_two_byte_registers_and_limits_are_told_in_words() {
     });
 }
 
-/// Runs commands with an arm of the maker.
+/// Starts a simulated arm of the maker. `test` gets a function that runs the tool on it, and one that returns paths in its
+/// folder.
 fn with_stock_arm(test: impl FnOnce(&dyn Fn(&[&str]) -> Output, &dyn Fn(&str) -> String)) {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = |name: &str| folder.path().join(name).display().to_string();

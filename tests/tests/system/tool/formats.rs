@@ -19,7 +19,7 @@ fn length(path: &Path) -> u64 {
     fs::metadata(path).map_or(0, |facts| facts.len())
 }
 
-/// Does the file have these bytes?
+/// Does the file contain this text?
 fn holds(path: &Path, text: &str) -> bool {
     fs::read(path).expect("a file").windows(text.len()).any(|part| part == text.as_bytes())
 }
@@ -51,7 +51,7 @@ fn a_program_reads_a_recording_while_it_is_written() {
     with_arm(TestSetup::any(), |arm| {
         let mut tool = arm.spawn_sevenbot(&["record", "--mcap", "-", "--driven"]);
         let mut output = tool.stdout.take().expect("a pipe");
-        // More than what is written before the first moment: the recording has not ended.
+        // More bytes than the tool writes before the first moment, so they arrive during the recording.
         let mut bytes = vec![0; 30_000];
         output.read_exact(&mut bytes).expect("moments");
         send_signal(&tool, Signal::INT);

@@ -1,4 +1,4 @@
-//! `sevenbot record` and `play`, when a file cannot be written or the connection is lost.
+//! `sevenbot record` and `play`, when a file cannot be written, the connection is lost or the arm restarts.
 
 use std::fs;
 use std::process::{Command, Stdio};

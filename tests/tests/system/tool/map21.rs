@@ -1,5 +1,5 @@
 //! `sevenbot` and the registers that only map 2.1 has, on an arm that serves both maps: `docs/protocol.md`, section 8.
-//! Function 04 writes them, which must leave no trace in map 2.2.
+//! The tool writes these registers with function 04. Such a write must not change reports and offsets of map 2.2.
 
 use std::fs::{self, File};
 
@@ -9,7 +9,7 @@ use system_tests::{TestArm, TestSetup, with_arm};
 
 const OPTIONS: u8 = 20;
 
-/// Keeps the port open, so that the simulator does not forget the last write and the reports when a program ends (M12).
+/// Keeps the port open, so that the simulator keeps the reports and the map of the last write when a program ends (M12).
 fn hold_open(arm: &mut TestArm) -> File {
     let path = arm.lend_port();
     let held = File::options().read(true).write(true).open(path).expect("the port");
@@ -38,7 +38,7 @@ fn options_are_a_setting_like_any_other() {
         let changes = stored(arm, &["restore", "--yes", file]);
         assert_eq!(words(&changes, "options"), ["options", "none", "->", "alarm", "frames"]);
         assert_eq!(arm.read(OFFSET, 8), [0, 0x85, 0, 0, 0, 0, 0, 2]);
-        // A file from before this setting.
+        // A file without options, as from a program that does not know them.
         fs::write(&path, text.replace("options = 2\n", "").replace("-5", "3")).expect("a file");
         stored(arm, &["restore", "--yes", file]);
         assert_eq!(arm.read(OFFSET, 8), [0, 3, 0, 0, 0, 0, 0, 2], "a missing setting keeps its value");
@@ -59,7 +59,7 @@ fn a_write_of_map_21_leaves_reports_and_offsets_as_they_were() {
         let shown = succeeded(arm.sevenbot(&["get", "53", "66", "20"]));
         assert_eq!(words(&shown, "53")[2], "20", "the reports go on");
         assert_eq!((words(&shown, "66")[2], words(&shown, "20")[2]), ("1", "1"));
-        // Reports of map 2.1 are asked for, so those of map 2.2 end (M4).
+        // A request for reports of map 2.1 ends the reports of map 2.2 (M4).
         succeeded(arm.sevenbot(&["set", "angle-feedback-frequency", "10"]));
         stored(arm, &["set", "--unlock", "options", "0"]);
         let shown = succeeded(arm.sevenbot(&["get", "53", "82"]));
@@ -86,7 +86,7 @@ fn registers_of_map_21_are_known_by_name() {
         assert_eq!((words(&shown, "83")[1], words(&shown, "91")[1]), ("present-angle.1", "present-load.1"));
         let range = failed(&arm.sevenbot(&["set", "load-feedback-frequency", "101"]), 2);
         assert!(range.contains("load-feedback-frequency takes 0 to 100"), "{range}");
-        // The same in map 2.1, which needs no other function.
+        // The same with `--map 2.1`, where function 04 writes all registers.
         stored(arm, &["--map", "2.1", "set", "--unlock", "options", "0"]);
         arm.drive_to(&STANDARD_POSE);
     });

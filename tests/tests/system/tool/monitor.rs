@@ -1,4 +1,4 @@
-//! `sevenbot monitor` in a terminal, and with output in lines.
+//! `sevenbot monitor` in a terminal, and with output as CSV and JSON.
 
 use super::output::{failed, succeeded};
 use std::fs;

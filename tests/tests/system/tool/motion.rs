@@ -39,7 +39,7 @@ pub(super) fn text(path: &Path) -> &str {
     path.to_str().expect("UTF-8")
 }
 
-/// The fields of the moments of a recording.
+/// The numbers in each moment of a recording.
 pub(super) fn moments(path: &Path) -> Vec<Vec<f64>> {
     let text = fs::read_to_string(path).unwrap_or_default();
     let lines = text.lines().filter(|line| line.starts_with(|first: char| first.is_ascii_digit()));
@@ -49,7 +49,7 @@ pub(super) fn moments(path: &Path) -> Vec<Vec<f64>> {
         .collect()
 }
 
-/// Plays a recording, and waits until the arm moves.
+/// Starts to play a recording, and waits until the tool writes the vacuum pump.
 pub(super) fn start_to_play(arm: &mut TestArm, arguments: &[&str]) -> RunningProgram {
     arm.spawn_sevenbot_until(&[&["play", "--verbose"], arguments].concat(), "-> write vacuum-pump")
 }
@@ -204,7 +204,7 @@ fn kill_while_playing(arm: &mut TestArm) {
     tool.kill();
 }
 
-/// Set-point period, watchdog and its action.
+/// First of four registers: set-point period (two bytes), time and action of the watchdog.
 const STREAM_REGISTERS: u8 = 184;
 
 #[test]
@@ -212,7 +212,7 @@ fn what_a_killed_play_left_is_put_right_by_the_next_move() {
     with_arm(TestSetup::any(), |arm| {
         for pause in [Duration::ZERO, Duration::from_secs(1)] {
             kill_while_playing(arm);
-            // The watchdog acts after 0.3 s. A program that starts before that waits for it.
+            // The watchdog acts after 0.3 s. A program that starts earlier waits until it has acted.
             sleep(pause);
             let output = arm.sevenbot(&["home"]);
             let said = all_output(&output);

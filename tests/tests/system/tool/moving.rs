@@ -101,7 +101,7 @@ fn stop_does_not_move_a_joint_without_a_servo() {
         arm.wait_until("the missing servo is reported", |arm| arm.register(242) == 0b100);
         let text = failed(&arm.sevenbot(&["stop"]), 1);
         assert!(text.contains("joint 3 does not answer") && text.contains("before you reach"), "{text}");
-        // The position was never measured, so its 0 must not become the target.
+        // The register reads 0 because the position was never measured. This 0 must not become the target.
         assert_eq!(arm.register(PRESENT_POSITION + 2), 0);
         assert_eq!(arm.register(TARGET_POSITION + 2), STANDARD_POSE[2]);
     });
@@ -139,7 +139,8 @@ pub(super) fn restart(arm: &mut StartedArm) {
     wait_until("the arm has started", || client.try_read(EFFECTOR_TYPE, 1, timeout) == Some(vec![0]));
 }
 
-/// Moves joint 1 by 10 degrees. On a busy machine its servo may be missing for a while, and then nothing may move.
+/// Moves joint 1 by 10 degrees. On a busy machine its servo may be missing for a while: then the tool must not move the arm,
+/// and this function runs it again.
 fn move_by_10_degrees(arm: &StartedArm) -> String {
     wait_for("the tool moves joint 1", || {
         let mut tool = tool();

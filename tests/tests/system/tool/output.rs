@@ -16,7 +16,8 @@ pub(crate) fn succeeded(output: Output) -> String {
     String::from_utf8(output.stdout).expect("text")
 }
 
-/// The output of a command that wrote settings. An arm in the emulator has no storage for them, and the command has to say so.
+/// Runs a command that writes settings, and returns its output. The emulator has no storage for settings: then the command
+/// has to report this.
 #[track_caller]
 pub(crate) fn stored(arm: &mut TestArm, arguments: &[&str]) -> String {
     let output = arm.sevenbot(arguments);

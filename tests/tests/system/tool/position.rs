@@ -1,4 +1,4 @@
-//! `sevenbot where` and `move-to`: positions of the tip in millimetres.
+//! `sevenbot where` and `move-to`: positions of the tip in millimetres. Also `model`, and `plot` of a recording.
 
 use std::process::Output;
 use std::thread::sleep;
@@ -22,7 +22,7 @@ fn distance(one: &[f64], other: [f64; 3]) -> f64 {
     one.iter().zip(other).map(|(one, other)| (one - other).powi(2)).sum::<f64>().sqrt()
 }
 
-/// Starts a move, and waits until the arm got the first frame of it.
+/// Starts a move, and waits until the tool prints `first_frame`, the first frame of the move.
 fn start_to_move(arm: &mut TestArm, arguments: &[&str], first_frame: &str) -> RunningProgram {
     arm.spawn_sevenbot_until(&[arguments, &["--verbose"]].concat(), first_frame)
 }

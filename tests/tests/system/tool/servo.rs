@@ -10,7 +10,7 @@ use system_tests::terminal::Terminal;
 use system_tests::wait::wait_until;
 use system_tests::{ArmClient, TestSetup, with_arm};
 
-/// The default baud rate of servos, and the ids of an arm.
+/// Options of a scan: only the default baud rate of servos, and only the ids of an arm.
 const ARM_IDS: [&str; 4] = ["--rates", "1000000", "--ids", "0-6"];
 /// A long timeout of the tool for replies, in milliseconds. An id without a servo takes three timeouts.
 const LONG_TIMEOUT: &str = "2000";
@@ -23,7 +23,7 @@ struct SimulatedAdapter {
 }
 
 impl SimulatedAdapter {
-    /// Starts it with the default baud rate, and waits until the servo with the id `first` replies.
+    /// Starts an adapter with the default baud rate, and waits until the servo with the id `first` replies.
     fn start(options: &[&str], first: u8) -> Self {
         Self::start_at(1_000_000, options, first)
     }
@@ -221,7 +221,7 @@ fn center_stops_a_blocked_servo() {
 fn center_stops_at_ctrl_c() {
     let bus = SimulatedAdapter::start(&[], 6);
     let mut terminal = bus.terminal(&["center", "6", "--yes", "--speed", "20"]);
-    // 497 counts, or fewer if the first reading is late.
+    // The distance is 497 counts, or a few less if the first reading is late.
     terminal.wait_for(" of 4");
     terminal.keys("\x03");
     terminal.wait_for("its torque is off");

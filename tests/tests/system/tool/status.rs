@@ -1,4 +1,4 @@
-//! `sevenbot status`, `recover`, `park` and `--log`, and what ends a pose and a stream: with the faults of the simulator.
+//! `sevenbot status`, `recover`, `park`, `log` and `--log`, and the faults that end a pose or a stream.
 
 use std::io::Write;
 use std::process::{Output, Stdio};
@@ -45,7 +45,7 @@ impl Rig {
         tool
     }
 
-    /// The true angles.
+    /// The angles of the simulated joints in degrees, not as the controller measured them.
     fn angles(&self) -> [f64; 7] {
         let state = self.0.state();
         std::array::from_fn(|joint| state["joints"][joint]["angle_degrees"].as_f64().expect("an angle"))
@@ -135,8 +135,8 @@ fn a_pose_that_fails_puts_the_speeds_back() {
     rig.0.says(&["fault", "clear"]);
 }
 
-/// The program is suspended during the outage. The controller sets the target of a fallen joint to where it holds it, so only
-/// that target shows the program that the joint has moved.
+/// The program is suspended during the outage. The controller sets the target of a fallen joint to the position where it holds
+/// the joint, so only this target shows the program that the joint has moved.
 #[test]
 fn d29_a_stream_tells_of_a_short_stop_in_which_a_joint_without_points_fell() {
     let rig = Rig::start();
@@ -150,7 +150,7 @@ fn d29_a_stream_tells_of_a_short_stop_in_which_a_joint_without_points_fell() {
     });
     send_signal(&stream, Signal::CONT);
     let text = failed(&stream.output(), 1);
-    // Reports from the outage may be on their way to the program: then they tell of it.
+    // If reports from the outage were on their way to the program, it names the outage instead.
     let tells = ["joint 3 was to stay at 65.0 degrees, and holds at", "not answer", "no servo answers"];
     assert!(tells.iter().any(|part| text.contains(part)), "{text}");
 }

@@ -12,7 +12,7 @@ use system_tests::terminal::Terminal;
 use system_tests::{Need, TestSetup, near, with_arm};
 use tempfile::TempDir;
 
-/// A running arm of the maker.
+/// A simulated arm with the maker's firmware.
 struct StockArm {
     _process: RunningProgram,
     folder: TempDir,
@@ -38,7 +38,7 @@ impl StockArm {
     }
 }
 
-/// The text has these angles, within the tolerance of [`near`].
+/// Checks that the text holds these angles, within the tolerance of [`near`].
 fn assert_near(text: &str, pose: [u8; 7]) {
     let angles: Vec<u8> = text.split_whitespace().map(|word| word.parse().expect("an angle")).collect();
     assert_eq!(angles.len(), pose.len(), "{text}");

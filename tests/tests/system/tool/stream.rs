@@ -18,7 +18,7 @@ use system_tests::{TestArm, TestSetup, near, with_arm};
 const FINE_TARGET: u8 = 128;
 /// Set-point period (two bytes), time and action of the watchdog, limits, content of the reports.
 const STREAM_REGISTERS: u8 = 184;
-/// The watchdog of the host acted.
+/// The fault bit that tells that the host-link watchdog acted (D24).
 const HOST_SILENT: u8 = 1 << 6;
 /// Longer than the watchdog of the tool, 300 ms.
 const SILENCE: Duration = Duration::from_secs(1);

@@ -128,7 +128,8 @@ impl Simulator {
     }
 }
 
-/// Polls every arm, and receives the replies a period later, for this time. Returns the number of rounds.
+/// Polls for this time: each round sends a read to every arm, waits for the end of the period, and receives the replies.
+/// Returns the number of rounds.
 fn poll_arms(ports: &mut [File], time: Duration) -> Outcome<u32> {
     let question = frame(Request::Read { address: PRESENT_POSITION.address, count: PRESENT_POSITION.count });
     let period = PERIOD.max(PERIOD_PER_ARM * u32::try_from(ports.len())?);

@@ -1,8 +1,8 @@
-//! `cargo xtask bench --streams`: set-points from streams of points (D23): how evenly, how late, with this project's method and
-//! with others.
+//! `cargo xtask bench --streams`: how evenly and with which delay set-points follow a stream of points (D23), with this
+//! project's method and with others. A last table shows how the simulated arm follows a streamed sine.
 //!
-//! A joint moves at a constant velocity, and its points come in frames with jitter, losses and a pause. All methods get
-//! the same frames. The seeds are fixed, so the figures are the same on every machine.
+//! In the first tables, a joint moves at a constant velocity, and its points come in frames with jitter, losses or a pause. All
+//! methods get the same frames. The seeds are fixed, so the figures are the same on every machine.
 
 mod methods;
 mod sine;

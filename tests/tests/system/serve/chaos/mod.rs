@@ -6,7 +6,7 @@
 //!      └── what it sent, and when ──▶ SentTargets ◀── what reached the arm ──────────┘
 //! ```
 //!
-//! The length is `SERVE_CHAOS_SECONDS`, and 24 s in each run of the tests. An hour, with an outage each minute:
+//! The test lasts `SERVE_CHAOS_SECONDS`, by default 24 s. A campaign of an hour, with an outage each minute:
 //!
 //! ```sh
 //! SERVE_CHAOS_SECONDS=3600 cargo test --release -p system-tests --test system serve::chaos -- --nocapture
@@ -43,8 +43,8 @@ const PROGRAMS: usize = 50;
 const BEFORE_OUTAGES: Duration = Duration::from_secs(4);
 const BETWEEN_OUTAGES: Duration = Duration::from_secs(56);
 const OUTAGE: Duration = Duration::from_millis(3_500);
-/// In a campaign a target of this age is late. A target waits in the server for 200 ms at most; the rest is for times in which
-/// the system does not run a program. Other test runs use `OUTAGE` instead, because the machine may be busy.
+/// If `SERVE_CHAOS_SECONDS` is set, a target of this age is late. A target waits in the server for 200 ms at most; the rest is
+/// for times in which the system does not run a program. Other test runs use `OUTAGE` instead, because the machine may be busy.
 const LATE: Duration = Duration::from_millis(2_000);
 /// The timeout of one read in [`wait_for_arm`]. It is long: fifty programs use the line, and the machine may be busy.
 const ANSWERED: Duration = Duration::from_secs(5);
@@ -115,7 +115,7 @@ fn run(length: Duration, seed: u64, late: Duration) {
     check(&chaos, &served, total, memory, files);
 }
 
-/// No target that reached the arm is as old as `late`.
+/// Prints the ages of the targets that reached the arm, and checks that each is less than `late`.
 fn check_ages(chaos: &Chaos, late: Duration) {
     let (ages, sent) = chaos.targets.ages();
     let age = |share: usize| ages.get(ages.len() * share / 1_000).copied().unwrap_or_default();
@@ -144,7 +144,7 @@ fn check(chaos: &Chaos, served: &Served, total: Tally, memory: u64, files: usize
     });
 }
 
-/// Each program, with its way to the server.
+/// The way of each program to the server.
 fn ways_in(served: &Served) -> Vec<WayIn> {
     let address = |stream: std::net::TcpStream| stream.peer_addr().expect("an address").to_string();
     let (tcp, web) = (address(served.connect()), address(served.connect_web()));

@@ -1,4 +1,4 @@
-//! Targets whose values hold a number. From the number follows when they were sent.
+//! Targets whose values encode the number of a write. From this number, the test knows when the targets were sent.
 
 use std::collections::VecDeque;
 use std::sync::Mutex;
@@ -20,7 +20,7 @@ const KEPT: u64 = 1 << 20;
 const JOINTS: usize = 7;
 const REMEMBERED: usize = 512;
 
-/// The times of the last targets, and those that reached the arm.
+/// The times of the last writes of targets, and the ages of those that reached the arm.
 pub(crate) struct SentTargets {
     start: Instant,
     next: AtomicU64,
@@ -56,7 +56,7 @@ impl SentTargets {
         outcome
     }
 
-    /// A frame is on the arm's line.
+    /// Notes the targets or the positions in a frame on the arm's line.
     pub(crate) fn note(&self, passing: Passing<'_>) {
         match passing {
             Passing::Request([_, _, 4 | 6, TARGET_POSITION, _, values @ ..]) => self.reached(values),
@@ -75,7 +75,7 @@ impl SentTargets {
         }
     }
 
-    /// Targets have reached the arm.
+    /// Notes the age of targets that have reached the arm.
     fn reached(&self, values: &[u8]) {
         let is_hold = |all: &[u8; JOINTS]| self.positions.lock().expect("no panic").contains(all);
         if values.first_chunk().is_some_and(is_hold) {

@@ -1,4 +1,4 @@
-//! One visit: questions and other acts in turn, then an end.
+//! One visit: questions and other acts in random order, then the end of the connection.
 
 use std::io;
 
@@ -20,7 +20,8 @@ pub(super) trait Visit: Sized {
     /// Ends the connection in one of several ways.
     fn leave(self, random: &mut Random, tally: &mut Tally);
 
-    /// Asks questions and does other acts at random, then leaves. Returns how the last question ended.
+    /// Asks questions and does other acts at random, then leaves. Stops at the first answer other than [`Answer::Replied`], or at
+    /// the end of the connection, and returns it.
     fn run(mut self, own: Option<u8>, random: &mut Random, tally: &mut Tally) -> Answer {
         let acts = 1 + random.below(20);
         for turn in 0..acts {

@@ -16,7 +16,7 @@ use super::web_visits::WebVisit;
 use super::wire::{Security, WayIn};
 use crate::serve::line_history::LineHistory;
 
-/// A reply that has not come after this time is lost.
+/// A reply that has not come after this time is lost. Other frames before it start the time again on a pseudo-terminal.
 const LOST: Duration = Duration::from_secs(30);
 /// A reply is lost after this time even if other frames come: reports, and replies to an earlier program.
 const LONGEST: Duration = Duration::from_secs(120);
@@ -29,7 +29,7 @@ const OWNERS: u8 = 14;
 pub(crate) struct Chaos {
     pub(crate) security: Security,
     end: Instant,
-    /// The end came early.
+    /// Ends all programs, also before `end`.
     is_over: AtomicBool,
     pub(crate) targets: SentTargets,
     history: LineHistory,
@@ -60,7 +60,7 @@ impl Chaos {
         End(self)
     }
 
-    /// The arm is about to be unplugged, or was seen to answer again.
+    /// Notes that the arm is about to be unplugged, or that it answers again.
     pub(crate) fn turn_over(&self) {
         self.history.turn_over();
         self.outages.fetch_add(1, Ordering::SeqCst);
@@ -77,7 +77,7 @@ impl Chaos {
         (u8::try_from(address).expect("small"), u8::try_from(count).expect("small"))
     }
 
-    /// A frame is on the arm's line.
+    /// Notes a frame on the arm's line.
     pub(crate) fn note(&self, passing: Passing<'_>) {
         self.targets.note(passing);
         self.history.note(passing);
@@ -88,7 +88,7 @@ impl Chaos {
         self.history.of_late()
     }
 
-    /// A wait begins for the reply with these registers: the first one, and how many.
+    /// Begins the wait for the reply that holds `asked`: the first register, and how many.
     pub(super) fn wait(&self, asked: (u8, u8)) -> ReplyWait<'_> {
         ReplyWait {
             chaos: self,
@@ -109,7 +109,7 @@ impl Drop for End<'_> {
     }
 }
 
-/// A program waits for a reply.
+/// The wait of a program for a reply.
 pub(super) struct ReplyWait<'a> {
     chaos: &'a Chaos,
     asked: (u8, u8),
@@ -120,13 +120,13 @@ pub(super) struct ReplyWait<'a> {
 }
 
 impl ReplyWait<'_> {
-    /// The reply may be missing, because the arm was unplugged.
+    /// Was the arm unplugged during the wait, so that the reply may be missing?
     pub(super) fn may_be_cut(&self) -> bool {
         let now = self.chaos.outages.load(Ordering::SeqCst);
         self.outages % 2 == 1 || now != self.outages
     }
 
-    /// Replies to an earlier program were received, which come before this reply.
+    /// Notes that frames for an earlier program were received. They come before this reply.
     pub(super) fn progress(&mut self) {
         self.quiet_since = Instant::now();
     }
@@ -147,10 +147,10 @@ impl ReplyWait<'_> {
     }
 }
 
-/// What came of a question.
+/// The outcome of a question.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Answer {
-    /// Its reply.
+    /// The reply came, with the written value if the program wrote one.
     Replied,
     /// No reply, or one without the written value, because the arm was unplugged.
     Cut,
@@ -162,18 +162,18 @@ pub(super) enum Answer {
     Ended,
 }
 
-/// What a program did, and what became of it.
+/// Counts of what happened to the connections and questions of a program.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Tally {
     pub(crate) visits: usize,
-    /// Connections that ended before their first reply.
+    /// Connections that the server refused, or that ended before their first reply.
     pub(crate) turned_away: usize,
     pub(crate) replies: usize,
     /// Questions without their reply because of an outage.
     pub(crate) cut: usize,
     pub(crate) lost: usize,
     pub(crate) crossed: usize,
-    /// Connections that the server ended after their first reply.
+    /// Connections that ended early, before or after their first reply.
     pub(crate) ended: usize,
     pub(crate) resets: usize,
 }

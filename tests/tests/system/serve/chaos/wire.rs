@@ -42,7 +42,7 @@ pub(crate) struct Security {
 }
 
 impl Security {
-    /// Trusts this certificate, if there is one.
+    /// With a certificate, TCP and WebSocket connections are encrypted, and the server has to prove that it holds it.
     pub(crate) fn new(token: &'static str, certificate: Option<PathBuf>) -> Self {
         let tls = certificate.map(|path| {
             let mut roots = RootCertStore::empty();
@@ -112,7 +112,7 @@ pub(crate) enum ByteWire {
 }
 
 impl ByteWire {
-    /// Opens a connection. Fails for [`WayIn::Web`], which is a [`WebWire`].
+    /// Opens a connection. Fails for [`WayIn::Web`], which needs a [`WebWire`].
     pub(crate) fn open(way_in: &WayIn, security: &Security) -> io::Result<Self> {
         match way_in {
             WayIn::Terminal(path) => {

@@ -29,7 +29,7 @@ pub(crate) enum Attack {
     LongWrites,
     /// The motors are switched on again and again.
     MotorsOn,
-    /// Commands of the maker's WebSocket.
+    /// Targets through the maker's WebSocket, as fast as the server takes them.
     WebTargets,
     /// A message of the WebSocket without an end.
     Fragments,
@@ -66,7 +66,7 @@ impl Attack {
         }
     }
 
-    /// Attacks in each turn of the gate, until its end.
+    /// Attacks in each turn of the gate, until the gate ends the programs.
     pub(crate) fn run(self, served: &Served, gate: &Gate) {
         while gate.wait() {
             match self {
@@ -88,7 +88,7 @@ impl Attack {
     }
 }
 
-/// Connects a program. Its first reply shows that the server has accepted it.
+/// Connects a program, waits for its first reply, and tells the gate that the program has begun.
 fn begin(served: &Served, gate: &Gate) -> TcpStream {
     let stream = log_in(served);
     Program(Box::new(stream.try_clone().expect("a second handle"))).read(TARGET_POSITION, 1);
@@ -97,7 +97,7 @@ fn begin(served: &Served, gate: &Gate) -> TcpStream {
     stream
 }
 
-/// Sends the bytes again and again, and drops the connection at the end.
+/// Sends the bytes again and again, and resets the connection at the end of the turn.
 fn flood(served: &Served, gate: &Gate, bytes: &[u8]) {
     send_without_end(&begin(served, gate), gate, bytes);
 }

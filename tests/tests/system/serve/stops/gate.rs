@@ -4,7 +4,6 @@ use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
 use system_tests::wait::TIMEOUT;
 
-/// The state of the turns.
 #[derive(Default)]
 struct Turns {
     /// Turns so far.
@@ -14,7 +13,7 @@ struct Turns {
     is_over: bool,
 }
 
-/// Lets programs into one turn after the other.
+/// Lets all programs begin each turn together.
 #[derive(Default)]
 pub(crate) struct Gate {
     turns: Mutex<Turns>,
@@ -41,7 +40,8 @@ impl Gate {
         End(self)
     }
 
-    /// Begins the next turn, and waits until this number of programs has begun it. Fails if one of them has failed.
+    /// Begins the next turn, and waits until this number of programs has begun it. Panics if a program has failed, and after
+    /// [`TIMEOUT`].
     pub(crate) fn release(&self, programs: usize) {
         let mut turns = self.lock();
         turns.count += 1;
@@ -64,7 +64,7 @@ impl Gate {
         !turns.is_over
     }
 
-    /// This program has begun the turn.
+    /// Counts this program among those that have begun the turn.
     pub(crate) fn has_begun(&self) {
         self.lock().begun += 1;
         self.changed.notify_all();

@@ -1,9 +1,9 @@
 //! Stops through real sockets, at random moments, beside programs that attack the server. Each stop reaches the arm. After it,
 //! no target of another program reaches the arm, and the arm comes to rest where it was held.
 //!
-//! Each test run makes two stops beside each attack, and checks no times. A campaign also checks how long a stop takes, on a
-//! machine that does nothing else. `SERVE_STOPS` is the number of stops beside each attack, and `SERVE_ATTACK` selects one
-//! attack, such as `Readers`. A hundred stops beside each attack take about seven minutes:
+//! By default the test makes two stops beside each attack, and checks no times. With `SERVE_STOPS`, the number of stops beside
+//! each attack, it also checks how long a stop takes, on a machine that does nothing else. `SERVE_ATTACK` selects one attack,
+//! such as `Readers`. A hundred stops beside each attack take about seven minutes:
 //!
 //! ```sh
 //! SERVE_STOPS=100 cargo test --release -p system-tests --test system serve::stops -- --nocapture
@@ -38,7 +38,7 @@ const WATCHED: Duration = Duration::from_millis(60);
 const WATCHED_AT_REST: Duration = Duration::from_millis(1_000);
 /// The arm is watched at rest once in this number of stops, and at the end of an attack.
 const BETWEEN_RESTS: usize = 50;
-/// Movement of a joint that holds, in hundredths of a degree.
+/// The most that a holding joint moves, in hundredths of a degree.
 const STILL: u16 = 30;
 /// The farthest that its weight draws a joint off its target, in hundredths of a degree.
 const DROOP: u16 = 150;
@@ -161,7 +161,7 @@ fn beside(
     times
 }
 
-/// The arm comes to rest near `held`, and stays there.
+/// Checks that the arm comes to rest near `held`, and stays there.
 #[track_caller]
 fn check_is_at_rest(program: &mut Program, held: &[u8], context: &str) {
     let mut at_rest = program.read(FINE_POSITION, FINE);
@@ -178,7 +178,7 @@ fn check_is_at_rest(program: &mut Program, held: &[u8], context: &str) {
 }
 
 /// Stops the arm as `sevenbot stop` does: reads the positions, writes them as targets, and reads the targets back. Repeats this
-/// until they are equal. Also returns these targets.
+/// until the targets equal the positions. Returns the times, and these targets.
 fn stop(stopper: &mut Program, line: &Line) -> (StopTimes, Vec<u8>) {
     let start = Instant::now();
     for _ in 0..100 {
@@ -253,7 +253,7 @@ fn print(attack: Attack, times: &[StopTimes]) {
     );
 }
 
-/// The 99th percentile is within the bounds, in time and in bytes.
+/// Checks that at least 99 of 100 stops are within the bounds, in time and in bytes.
 fn check_times(attack: Attack, times: &[StopTimes]) {
     let late = |is_late: fn(&&StopTimes) -> bool| times.iter().filter(is_late).count();
     let (in_time, in_bytes) = (late(|stop| stop.to_arm > LATEST), late(|stop| stop.bytes > MOST_BEFORE));

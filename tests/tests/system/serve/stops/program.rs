@@ -28,26 +28,26 @@ impl<W: Read + Write + Send> Wire for W {}
 pub(crate) struct Program(pub(super) Box<dyn Wire>);
 
 impl Program {
-    /// One on a pseudo-terminal, one at the Unix socket, one over TCP.
+    /// Three programs: one on a pseudo-terminal, one at the Unix socket, one over TCP.
     pub(crate) fn of_each_kind(served: &Served) -> Vec<Self> {
         let terminal = Self::on_terminal(&served.folder.path().join("a"));
         vec![terminal, Self::over_unix(served), Self::over_tcp(served)]
     }
 
-    /// One on a pseudo-terminal.
+    /// A program on a pseudo-terminal.
     pub(crate) fn on_terminal(path: &Path) -> Self {
         let terminal = serialport::new(path.to_str().expect("text"), 115_200).timeout(TIMEOUT).open();
         Self(Box::new(terminal.expect("a port")))
     }
 
-    /// One at the Unix socket.
+    /// A program at the Unix socket.
     pub(crate) fn over_unix(served: &Served) -> Self {
         let local = UnixStream::connect(served.local_socket()).expect("a connection");
         local.set_read_timeout(Some(TIMEOUT)).expect("a timeout");
         Self(Box::new(local))
     }
 
-    /// One over TCP.
+    /// A program over TCP.
     pub(crate) fn over_tcp(served: &Served) -> Self {
         Self(Box::new(log_in(served)))
     }
@@ -69,7 +69,7 @@ impl Program {
     }
 }
 
-/// A connection over TCP that has shown its token.
+/// Opens a TCP connection and sends the token.
 pub(super) fn log_in(served: &Served) -> TcpStream {
     let mut stream = served.connect();
     stream.set_nodelay(true).expect("an option");
@@ -78,7 +78,7 @@ pub(super) fn log_in(served: &Served) -> TcpStream {
     stream
 }
 
-/// Streams targets. After each stop it starts anew when the gate opens.
+/// In each turn of the gate, asks to drive again after the last stop, and streams targets until the turn ends.
 pub(crate) fn stream(program: &mut Program, gate: &Gate) {
     let mut goals = [40, 140].into_iter().cycle();
     while gate.wait() {
