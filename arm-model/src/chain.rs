@@ -117,7 +117,7 @@ pub(crate) const FOREARM_SOLIDS: &[Solid] = &[
 ];
 pub(crate) const WRIST_SOLIDS: &[Solid] = &[solid([0.0, -16.0, 0.0], [0.0, 16.0, 0.0], 12.0)];
 pub(crate) const HAND_SOLIDS: &[Solid] = &[solid(ORIGIN, [TOOL - 5.0, 0.0, 0.0], 10.0)];
-/// The disc, and a pin at its edge that shows its direction at 90 degrees of joint 6.
+/// The disc, and a pin at the edge of the disc, on its y axis. The pin shows how joint 6 turns the disc.
 pub(crate) const DISC_SOLIDS: &[Solid] = &[
     solid([-5.0, 0.0, 0.0], ORIGIN, DISC_RADIUS),
     solid([-5.0, DISC_RADIUS - 2.0, 0.0], [2.0, DISC_RADIUS - 2.0, 0.0], 2.0),

@@ -20,7 +20,7 @@ use crate::mesh::Mesh;
 
 /// Rotates to the axes of glTF, where y is up, z forward and x to the left: a third of a turn about the diagonal.
 const FROM_Z_UP: UnitQuaternion = UnitQuaternion([-0.5, -0.5, -0.5, 0.5]);
-/// Bytes of three `f32`.
+/// Bytes of a vector of three `f32`.
 const VECTOR_BYTES: usize = 12;
 
 /// The arm as binary glTF (GLB), in the straight pose. The nodes are the links. To move a joint, turn the node of its link

@@ -12,7 +12,7 @@
 //! are 0 in the straight pose: the arm forward, the rear arm upright, forearm and hand level. In this pose all links have the
 //! axes of the base. [`joint_angles`] converts the degrees of the registers.
 //!
-//! Shapes of URDF and MJCF are cylinders along the axes of the parts; those of glTF are meshes as in [`Body`]. The shapes are
+//! Shapes of URDF and MJCF are cylinders along the axes of the parts; shapes of glTF are meshes as in [`Body`]. The shapes are
 //! for display: dimensions that [`kinematics::geometry`] does not define are estimates. The three models leave out joint 7,
 //! the claw, which moves no point of the kinematics.
 //!

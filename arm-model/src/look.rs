@@ -1,6 +1,6 @@
 //! The appearance of the arm: the meshes of its bodies, in the axes of their links, in mm.
 //!
-//! Joints and their distances are those of [`kinematics::geometry`]. Widths and thicknesses are estimates.
+//! The places of the joints come from [`kinematics::geometry`]. Widths and thicknesses are estimates.
 
 use kinematics::geometry::{
     BASE_HEIGHT, BASE_RADIUS, DISC_RADIUS, ELBOW_OFFSET, FINGER_AXIS, FINGER_BEND, FINGER_END, FOREARM,
@@ -54,7 +54,7 @@ impl Body {
         Self::OppositeFinger,
     ];
 
-    /// The joint that turns the body, 1 to 7. `None` for the base.
+    /// The joint to which the body belongs, 1 to 7. The rod, which joints 2 and 3 move, belongs to joint 3. `None` for the base.
     #[must_use]
     pub const fn joint(self) -> Option<u8> {
         match self {
@@ -193,7 +193,7 @@ fn hand(mesh: &mut Mesh) {
     mesh.cylinder(Shell, MeshAxis::X, ORIGIN, 11.0, [9.0, TOOL - 5.0]);
 }
 
-/// Adds the disc, and a pin that shows its direction.
+/// Adds the disc, and a pin on its y axis that shows how joint 6 turns the disc.
 fn disc(mesh: &mut Mesh) {
     mesh.cylinder(Accent, MeshAxis::X, ORIGIN, DISC_RADIUS, [-5.0, 0.0]);
     mesh.cylinder(Dark, MeshAxis::X, [0.0, DISC_RADIUS - 3.5, 0.0], 2.5, [-1.0, 3.0]);
@@ -208,7 +208,7 @@ fn palm(mesh: &mut Mesh) {
     mesh.plate(Dark, MeshAxis::Z, &[foot[0], foot[1], (left, 6.0), (right, 6.0)], [-6.0, 6.0]);
 }
 
-/// Adds a finger from its axis on: the left finger for a `side` of 1, the right one for -1.
+/// Adds a finger whose axis is at the origin: the left finger for a `side` of 1, the right finger for -1.
 fn finger(mesh: &mut Mesh, side: f64) {
     let bone = |points: [[f64; 2]; 2], radii: [f64; 2]| {
         let [[x0, y0], [x1, y1]] = points;

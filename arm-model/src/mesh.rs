@@ -188,7 +188,7 @@ fn hull(points: impl Iterator<Item = OutlinePoint>) -> Vec<OutlinePoint> {
     lower
 }
 
-/// One side of the hull of sorted points, without its last point, with which the other side begins.
+/// One side of the hull of sorted points. The last point is left out, because the other side begins with it.
 fn half_hull(points: impl Iterator<Item = OutlinePoint>) -> Vec<OutlinePoint> {
     let mut side: Vec<OutlinePoint> = Vec::new();
     for point in points {

@@ -8,7 +8,7 @@
 //! ```
 //!
 //! Joint 2 turns the rear arm and joint 3 the lever, both about the shoulder. The joints of the elbow and the rod are passive.
-//! Masses and servos are those of the simulator, [`arm_sim::parameters`].
+//! Masses and servos are the same as in the simulator, [`arm_sim::parameters`].
 
 use std::io;
 
@@ -105,7 +105,7 @@ struct ServoClass {
 const LARGE: ServoClass = ServoClass { name: "large", joint: Joint::ALL[0] };
 const SMALL: ServoClass = ServoClass { name: "small", joint: Joint::ALL[6] };
 
-/// The class of the servo of one of joints 1 to 6, by its name in the model; `None` for a passive joint.
+/// The attribute with the servo class of the joint of this name in the model. `None` for a passive joint.
 fn class_of(name: &str) -> Option<(&'static str, String)> {
     let (joint, _) = Joint::ALL.into_iter().zip(JOINT_NAMES).find(|(_, other)| *other == name)?;
     let is_large = ServoParameters::of(joint) == ServoParameters::of(LARGE.joint);

@@ -29,7 +29,7 @@ impl Pose {
         self.origin + self.x * x + self.y * y + self.z * z
     }
 
-    /// The pose of a body whose origin is this point of the present body, and which is turned about the present z axis.
+    /// The pose of a body with its origin at the point (x, y, 0) of this body, turned by `degrees` about the z axis of this body.
     fn turned_about_z(&self, [x, y]: [f64; 2], degrees: f64) -> Self {
         let (sine, cosine) = degrees.to_radians().sin_cos();
         let along = self.x * cosine + self.y * sine;

@@ -1,4 +1,5 @@
-//! Parsers of other projects read the models. The forward kinematics of the models are those of `kinematics`.
+//! Parsers of other projects read the URDF and the glTF. The results are compared with `kinematics`: the URDF in random poses,
+//! the glTF in the straight pose. Of the MJCF only a part of the text is checked.
 
 #![allow(clippy::expect_used, clippy::indexing_slicing, clippy::panic, clippy::unwrap_used)] // A panic is a failed test.
 

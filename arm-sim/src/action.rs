@@ -27,7 +27,7 @@ pub enum Action {
     HaltController,
     /// `fault 3=missing` or, for two seconds, `fault 3=missing 2000000`.
     Fault(ArmFault, Option<Duration>),
-    /// `clear` removes all faults, `clear 3` those of one location.
+    /// `clear` removes all faults, `clear 3` the faults of one location.
     Clear(Option<FaultLocation>),
     /// `hand 2 445`: a hand turns a joint to a position and holds it there.
     Hand(Joint, u16),
@@ -37,9 +37,9 @@ pub enum Action {
     LetGo(Joint),
     /// `weight 150`: grams in the gripper.
     Weight(u16),
-    /// `drop`: the gripper drops what it holds. The thing between the claws and the weight are gone.
+    /// `drop`: the tool drops everything. The thing between the claws and the weight disappear; an object of the scene falls.
     Drop,
-    /// `trip 2` latches an overload of a joint's servo; `trip 2 heat` makes it too hot.
+    /// `trip 2` latches an overload of a joint's servo; `trip 2 heat` makes the servo too hot.
     Trip(Joint, Trip),
     /// `scene cube red 30 40 0 220; table -60`: what stands on the table ([`Scene`]). `scene off` removes the table, too.
     Scene(Option<Scene>),

@@ -15,7 +15,7 @@ pub trait ArmController: Clone + Debug {
     /// Sets the longest delay of a servo's answer between the wire and the controller, as in the buffer of a USB adapter.
     fn set_answer_delay(&mut self, delay: Duration);
 
-    /// Takes bytes from the host, and returns how many. An empty slice states that the host's line is silent.
+    /// Takes bytes from the host, and returns how many it took. An empty slice states that the host's line is silent.
     fn host_bytes(&mut self, now: Instant, bytes: &[u8]) -> usize;
 
     /// Takes all bytes that were received from the servo bus.

@@ -24,7 +24,6 @@ impl FaultCount {
         }
     }
 
-    /// The sum of two counts.
     #[must_use]
     pub(crate) const fn plus(self, other: Self) -> Self {
         Self {

@@ -55,7 +55,7 @@ pub enum ArmFault {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum FaultLocation {
-    /// The servo of a joint.
+    /// A joint: its servo, or an obstacle.
     Joint(Joint),
     /// The servo bus.
     Bus,
@@ -170,7 +170,7 @@ impl Display for ArmFault {
 }
 
 impl ArmFault {
-    /// Where it is.
+    /// The part of the arm that has the fault; for an obstacle, its joint.
     #[must_use]
     pub const fn location(self) -> FaultLocation {
         match self {
@@ -183,14 +183,14 @@ impl ArmFault {
         }
     }
 
-    /// Does the fault act on the [`Plant`]? [`ArmFault::apply`] ignores those that do not.
+    /// Does the fault act on the [`Plant`]? [`ArmFault::apply`] ignores all other faults.
     #[must_use]
     pub const fn is_of_plant(self) -> bool {
         !matches!(self, Self::Flash(_) | Self::Line(_))
     }
 
     /// Does this new fault replace `other`? A servo and the supply have one fault at a time. A joint has one obstacle of each
-    /// kind, and the host line one fault of each kind.
+    /// kind, and the host line one fault of each kind. The flash and the arm can have all their faults at the same time.
     #[must_use]
     pub fn replaces(self, other: Self) -> bool {
         match (self, other) {
@@ -203,7 +203,7 @@ impl ArmFault {
         }
     }
 
-    /// The unit of its [`FaultCount`]. `None`: its effects are not counted.
+    /// The unit of the fault's [`FaultCount`]. `None`: the effects of the fault are not counted.
     #[must_use]
     pub const fn unit(self) -> Option<&'static str> {
         Some(match self {

@@ -25,13 +25,13 @@ pub trait Cells: Debug {
     /// Reads the bytes from `offset` on.
     ///
     /// # Errors
-    /// The cells failed.
+    /// The cells cannot be read.
     fn read(&self, offset: usize, bytes: &mut [u8]) -> Result<(), NorFlashErrorKind>;
 
     /// Replaces the bytes from `offset` on.
     ///
     /// # Errors
-    /// The cells failed.
+    /// The cells cannot be written.
     fn write(&mut self, offset: usize, bytes: &[u8]) -> Result<(), NorFlashErrorKind>;
 }
 
@@ -81,7 +81,7 @@ impl Cells for Memory {
     }
 }
 
-/// The two sectors.
+/// The two journal sectors, with the rules of NOR flash, on cells of the type `C`.
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Flash<C = Memory>(C);

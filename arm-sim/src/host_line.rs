@@ -246,7 +246,7 @@ impl LineDirection {
             || !self.delayed.is_empty()
     }
 
-    /// Moves the bytes on up to `now`. Inlined, because the line is mostly idle.
+    /// Advances the bytes on the line up to `now`. Inlined, because most calls find an idle line.
     #[inline]
     pub(crate) fn advance(&mut self, now: Instant) {
         if self.is_in_transit() {

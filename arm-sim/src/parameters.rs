@@ -1,6 +1,6 @@
-//! The parameters of the simulated arm, its joints and its servos, each with its unit and its source. Those of the supply are in
-//! `plant/supply.rs`, of the wire in `plant/wire.rs`, of obstacles in `plant/obstacles.rs`, and a servo's times on the bus in
-//! `servo/config.rs`.
+//! The parameters of the simulated arm, its joints and its servos, each with its unit and its source. The parameters of the
+//! supply are in `plant/supply.rs`, of the wire in `plant/wire.rs`, of obstacles in `plant/obstacles.rs`, and a servo's times on
+//! the bus in `servo/config.rs`.
 //!
 //! "Assumed" means that no arm was measured or weighed. Change a value here to simulate another arm.
 //!

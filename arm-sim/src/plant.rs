@@ -6,9 +6,9 @@
 //!   plant.poll(now) ◀── Wire ◀────────────────┘
 //! ```
 //!
-//! A loaded joint falls without torque, and droops in proportion to its load with torque. After power-up a hand holds each
-//! joint until it has torque. The same calls at the same times give the same bytes on every machine. The plant does not know
-//! the controller.
+//! Without torque, a loaded joint falls. With torque, it droops in proportion to its load. After power-up a hand holds each
+//! joint until the joint has torque. The same calls at the same times give the same bytes on every machine. The plant does
+//! not know the controller.
 
 mod disturbance;
 mod inertia;
@@ -58,7 +58,7 @@ pub struct Plant {
     scales: [AngleScale; JOINTS],
     /// The pose for which the servos are loaded with the arm's weight.
     pose: JointSines,
-    /// The weight in the gripper for which they are loaded, in grams. `None`: they are not loaded yet.
+    /// The weight in the gripper for which the servos are loaded, in grams. `None`: the servos are not loaded yet.
     weighed_g: Option<u16>,
     decoder: Decoder,
     wire: Wire,
@@ -69,10 +69,10 @@ pub struct Plant {
     carried_g: u16,
     /// The claws have touched the thing between them.
     is_thing_gripped: bool,
-    /// The angle at which the claws touch an object of the room that is between them, in thousandths of a degree. `None`: nothing
-    /// is between them, or a thing that a person put there.
+    /// The angle at which the claws touch an object of the room that is between them, in thousandths of a degree. `None`: between
+    /// the claws is nothing, or a thing that a person put there.
     room_stop: Option<i32>,
-    /// What stands on the table.
+    /// The table and the things on it. `None` without a scene.
     world: Option<Box<World>>,
     /// The pump sucks.
     is_sucking: bool,
@@ -238,8 +238,8 @@ impl Plant {
         self.supply.decivolts(self.now, self.servos.iter().map(Servo::current).sum())
     }
 
-    /// Leaves only servos with these ids on the bus. An id from 0 to 6 goes to its joint's servo if that has no id yet;
-    /// any other id goes to the first servo without an id.
+    /// Leaves only servos with these ids on the bus. An id from 0 to 6 goes to its joint's servo. A repeated id, or any other
+    /// id, goes to the first free servo whose joint has no id in the list.
     pub fn set_ids(&mut self, ids: &[u8]) {
         let mut free: Vec<Joint> = Joint::ALL.to_vec();
         for &id in ids {
@@ -268,7 +268,7 @@ impl Plant {
         self.servo(joint).and_then(|servo| servo.torque(self.now))
     }
 
-    /// Had a joint's servo power at the last call with a time, and had it started?
+    /// Had the servo of a joint started, and did it have power, at the last call with a time?
     #[must_use]
     pub fn has_power(&self, joint: Joint) -> bool {
         self.servo(joint).is_some_and(|servo| servo.has_power(self.now))
@@ -286,21 +286,21 @@ impl Plant {
         self.servo(joint).map_or(0, Servo::goal_counts)
     }
 
-    /// The torque of a joint's motor in 0.1 % of its stall torque: its load less what its speed needs. Positive values
-    /// are towards more counts.
+    /// The torque of a joint's motor in 0.1 % of its stall torque: its load less the part that its speed needs. Positive
+    /// values are towards more counts.
     #[must_use]
     pub fn motor_torque(&self, joint: Joint) -> i16 {
         self.servo(joint).map_or(0, Servo::motor_torque)
     }
 
-    /// The greatest distance from its set-point that a driven joint can have under its present external load, in thousandths of a
+    /// The greatest distance between a driven joint and its set-point under the present external load, in thousandths of a
     /// degree. `None`: the load exceeds the stall torque.
     #[must_use]
     pub fn droop(&self, joint: Joint) -> Option<i32> {
         self.servo(joint)?.droop().and_then(|droop| i32::try_from(droop).ok())
     }
 
-    /// The distance in which its stall torque would stop a joint from its present speed, in thousandths of a degree.
+    /// The distance in which the stall torque would stop a joint from its present speed, in thousandths of a degree.
     #[must_use]
     pub fn stopping_distance(&self, joint: Joint) -> i32 {
         self.servo(joint).map_or(0, |servo| i32::try_from(servo.stopping_distance()).unwrap_or(i32::MAX))

@@ -117,7 +117,7 @@ impl fmt::Debug for Replay {
 }
 
 impl Replay {
-    /// Switches the arm of a session on.
+    /// Powers up an arm of the kind and with the settings of the header.
     #[must_use]
     pub fn new(header: &SessionHeader) -> Self {
         let arm: Box<dyn ReplayedArm> = match header.controller {
@@ -139,10 +139,10 @@ impl Replay {
         Ok(replay.line)
     }
 
-    /// Replays the next line after the first two.
+    /// Replays the next line. The two lines of the header are not passed to this function.
     ///
     /// # Errors
-    /// The line is not an entry or is earlier than the one before, or the arm has sent other bytes.
+    /// The line is not an entry, its time is before the previous line, or the arm has sent other bytes.
     pub fn line(&mut self, text: &str) -> Result<(), ReplayError> {
         self.line += 1;
         let line = self.line;

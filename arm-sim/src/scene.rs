@@ -1,4 +1,4 @@
-//! What stands on the table, as text: one thing on each line, or with `;` between them.
+//! The table and the things on it as text: one thing on each line, or with `;` between them.
 //!
 //! ```text
 //!   # Lengths in mm and weights in g, in the frame of the arm: x to the right, y forward, z up.
@@ -9,7 +9,7 @@
 //!   cylinder can 40 60 100 -80 200  diameter, height, weight, x, y
 //! ```
 //!
-//! Cubes and cylinders stand on what is below them: on the table, on a wall, or on one that was named before.
+//! A cube or a cylinder stands on the highest surface below it: the table, a wall, or a cube or cylinder of an earlier line.
 
 use alloc::string::String;
 use alloc::vec::Vec;
@@ -24,7 +24,7 @@ use crate::thousandths::Thousandths;
 pub const MOST_OBJECTS: usize = 24;
 /// A name has at most this many characters.
 const LONGEST_NAME: usize = 16;
-/// A place is at most this far from the base, in mm.
+/// The largest coordinate of a place, in mm, in each direction from the base.
 const FARTHEST: f64 = 1_000.0;
 /// The least and the greatest length, in mm.
 const SIZES: [f64; 2] = [5.0, 1_000.0];
@@ -48,14 +48,14 @@ pub enum Tool {
 pub enum Form {
     /// A cube.
     Cube {
-        /// The edge.
+        /// The length of an edge.
         edge: f64,
     },
     /// A cylinder that stands upright.
     Cylinder {
         /// The diameter.
         diameter: f64,
-        /// From its foot to its top.
+        /// The distance from the foot to the top.
         height: f64,
     },
 }
@@ -64,9 +64,9 @@ pub enum Form {
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Item {
-    /// Its name.
+    /// The name: 1 to 16 letters, digits or `-`, different from all other names in the scene.
     pub name: String,
-    /// Its form.
+    /// The form and the size.
     pub form: Form,
     /// Its weight in grams.
     pub grams: u16,
@@ -80,7 +80,7 @@ pub struct Item {
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Block {
-    /// Its name.
+    /// The name, with the rules of [`Item::name`].
     pub name: String,
     /// The position of its middle, seen from above: x and y in mm.
     pub at: [f64; 2],
@@ -124,7 +124,7 @@ impl Default for Scene {
 pub struct SceneError {
     /// The number of the line, or of the part between `;`, from 1.
     pub line: usize,
-    /// What is wrong with it, and what it should be.
+    /// The rule that the line breaks, as a text for the user.
     pub reason: &'static str,
 }
 
@@ -207,7 +207,7 @@ fn number(word: &str) -> Result<f64, &'static str> {
     Thousandths::parse(word).map(|Thousandths(value)| f64::from(value) / 1_000.0).ok_or(NUMBER)
 }
 
-/// A number of a scene in its text form.
+/// Converts a number of a scene to its text form, rounded to the nearest thousandth.
 #[expect(
     clippy::cast_possible_truncation,
     reason = "numbers of a scene are small, and a part below a thousandth is none"

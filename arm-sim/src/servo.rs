@@ -42,7 +42,7 @@ use temperature::Temperature;
 /// An answer of a servo.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ServoAnswer {
-    /// The answer is sent this much later than after [`ServoConfig::return_delay`].
+    /// The delay of the answer in addition to [`ServoConfig::return_delay`].
     pub delay: Duration,
     /// The frame.
     pub bytes: ServoFrameBuffer,
@@ -72,13 +72,13 @@ pub struct Servo {
     thing_count: FaultCount,
     /// Milliseconds in which the joint was pushed.
     push_count: FaultCount,
-    /// The values in the registers apart from the measurements of the motor. `None`: not written since the start.
+    /// The reported values of the last step that changed the servo. `None`: no step did so since the start.
     reported: Option<Reported>,
     /// The registers hold the measurements of an earlier step. They are updated when a frame comes.
     is_reading_old: bool,
 }
 
-/// What a servo reports apart from the measurements of its motor.
+/// The values that a servo reports besides the measurements of its motor: supply, temperature and error bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Reported {
@@ -88,7 +88,7 @@ struct Reported {
 }
 
 impl Servo {
-    /// The servo of a joint, with the joint's id. A hand holds it. It executes frames from `ready_at` on.
+    /// The servo of a joint, with the joint's id. A hand holds the joint. The servo executes frames from `ready_at` on.
     #[must_use]
     pub fn new(joint: Joint, config: ServoConfig, position_counts: u16, ready_at: Instant) -> Self {
         Self {
@@ -126,7 +126,7 @@ impl Servo {
         (self.reported, self.is_reading_old) = (None, false);
     }
 
-    /// The id.
+    /// The id on the servo bus.
     #[must_use]
     pub fn id(&self) -> u8 {
         self.registers.id()
@@ -222,7 +222,7 @@ impl Servo {
         self.registers.torque_switch() == self.config.torque_codes.code(Torque::On)
     }
 
-    /// The setting of the torque switch.
+    /// The setting of the torque switch. [`Torque::Free`] stands for each code that means neither on nor damping.
     #[must_use]
     pub fn torque_switch(&self) -> Torque {
         let code = self.registers.torque_switch();
@@ -244,7 +244,7 @@ impl Servo {
         now >= self.ready_at && !self.fault.is_missing()
     }
 
-    /// The current in 0.1 % of that of a stalled motor. It is proportional to the magnitude of the torque.
+    /// The current in 0.1 % of the current of a stalled motor. It is proportional to the magnitude of the torque.
     #[must_use]
     pub fn current(&self) -> u16 {
         self.motor.torque().unsigned_abs().min(1_000)
@@ -306,7 +306,7 @@ impl Servo {
         self.is_held = is_held && !self.is_on;
     }
 
-    /// Does a hand hold it?
+    /// Does a hand hold the joint?
     pub(crate) const fn is_held(&self) -> bool {
         self.is_held
     }

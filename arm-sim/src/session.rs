@@ -12,8 +12,8 @@
 //! ```
 //!
 //! Times are microseconds since power-up. Every call that lets time pass is recorded, because an idle host line has a
-//! meaning ([D4](protocol_core::decisions#d4)). A [`Replay`](crate::replay::Replay) repeats the same inputs on a new arm and
-//! compares the bytes that it sends. It reports the first difference.
+//! meaning ([D4](protocol_core::decisions#d4)). A [`Replay`](crate::replay::Replay) repeats the same inputs on a new arm,
+//! compares the bytes that this arm sends, and reports the first difference.
 
 use alloc::vec::Vec;
 use core::fmt::{self, Debug, Display, Formatter};

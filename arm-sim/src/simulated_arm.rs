@@ -78,7 +78,7 @@ pub struct SimulatedArm<F, B = Plant, C = Controller> {
     is_off: bool,
     faults: FaultList,
     ended_faults: EndedFaults,
-    /// The host has disconnected, and this many of its bytes are still on the line to the arm.
+    /// The host has disconnected, and this many of its bytes are still on the line to the arm. `None`: no host is leaving.
     leaving: Option<usize>,
 }
 
@@ -102,7 +102,7 @@ impl<F: NorFlash, B: ServoBus> SimulatedArm<F, B> {
         Self::power_up(now, config, flash, bus)
     }
 
-    /// The registers.
+    /// The register file of the controller.
     #[must_use]
     pub fn registers(&self) -> &RegisterFile {
         self.controller.registers()
@@ -170,7 +170,7 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
         self.controller.baud()
     }
 
-    /// Whether bytes on the host line take the time that the baud rate requires. A change drops the bytes on the line.
+    /// Sets whether bytes on the host line take the time that the baud rate requires. A change drops the bytes on the line.
     pub(crate) fn set_paced(&mut self, is_paced: bool) {
         if self.config.is_paced != is_paced {
             self.config.is_paced = is_paced;
@@ -178,7 +178,7 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
         }
     }
 
-    /// As [`Self::set_paced`] says.
+    /// Do bytes on the host line take the time that the baud rate requires?
     pub(crate) const fn is_paced(&self) -> bool {
         self.config.is_paced
     }
@@ -187,7 +187,7 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
         self.config.is_paced.then(|| self.controller.baud())
     }
 
-    /// Copies the bytes on the host line to `tap` from now on.
+    /// Copies the bytes on the host line to `tap` from now on. Calls [`Tap::restart`] first.
     pub fn set_tap(&mut self, mut tap: impl Tap + 'static) {
         tap.restart(gap(self.controller.baud()));
         self.tap = Watcher::holding(Box::new(tap));
@@ -230,8 +230,8 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
         self.process(self.now, false);
     }
 
-    /// The last host disconnects: the bytes on the line to it are lost. The arm executes what the host sent before, without
-    /// sending answers. Then the reports end ([M12](protocol_core::decisions#m12)).
+    /// The last host disconnects: the bytes on the line to this host are lost. The arm executes the bytes that the host sent
+    /// before, without sending answers. Then the reports end ([M12](protocol_core::decisions#m12)).
     pub fn host_disconnect(&mut self) {
         self.record_action(self.now, Action::Disconnect);
         self.to_host.clear(self.paced_baud());
@@ -240,7 +240,7 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
         self.process(self.now, false);
     }
 
-    /// Tells the controller that the host has left, if the last bytes of the host are executed.
+    /// Tells the controller that the host has left, once all bytes of that host are executed.
     fn end_host(&mut self) {
         if self.leaving == Some(0) && !self.is_halted {
             self.controller.host_left(self.now);
@@ -291,7 +291,7 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
     /// Passes the bytes that have arrived from the host, possibly none, to the controller. Returns how many it took.
     fn pass_host_bytes(&mut self) -> usize {
         let arrived = self.to_arm.arrived();
-        // The bytes of the next host wait until those of the last one are executed.
+        // The bytes of the next host wait until the bytes of the leaving host are executed.
         let end = self.leaving.unwrap_or(usize::MAX).min(arrived.len());
         let taken = self.controller.host_bytes(self.now, arrived.get(..end).unwrap_or(arrived));
         if let (Some(tap), Some(bytes)) = (self.tap.get(), arrived.get(..taken)) {

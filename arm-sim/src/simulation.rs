@@ -47,7 +47,7 @@ use crate::session::SessionRecorder;
 use crate::simulated_arm::{ArmConfig, SimulatedArm};
 use crate::tap::Tap;
 
-/// The arm's bytes are taken off its line at least this often, so that the line is never full.
+/// The arm's bytes are taken off the host line at least this often, so that the line seldom fills up.
 const TAKE_PERIOD: Duration = Duration::from_millis(10);
 
 /// The configuration of a simulation.
@@ -101,7 +101,7 @@ impl Simulation {
         Self::power_up(config)
     }
 
-    /// The registers.
+    /// The register file of the controller.
     #[must_use]
     pub fn registers(&self) -> &RegisterFile {
         self.arm.registers()
@@ -125,7 +125,7 @@ impl<C: ArmController> Simulation<C> {
         self.now
     }
 
-    /// Whether bytes on the host line take the time that the baud rate requires.
+    /// Do bytes on the host line take the time that the baud rate requires?
     #[must_use]
     pub const fn is_paced(&self) -> bool {
         self.arm.is_paced()
@@ -154,7 +154,7 @@ impl<C: ArmController> Simulation<C> {
         core::mem::take(&mut self.received)
     }
 
-    /// Lets time pass.
+    /// Lets time pass, and carries out the planned actions that become due.
     pub fn advance(&mut self, time: Duration) {
         let end = self.now + time;
         while self.now < end {
@@ -321,8 +321,9 @@ impl<C: ArmController> Simulation<C> {
         self.planned.push((self.now + after, action));
     }
 
-    /// Passes everything that is done to the arm by [`Simulation::send`] and [`Simulation::act`], and every byte that the arm
-    /// sends, to `recorder` from now on: see [`crate::session`]. A copy of the simulation has no recorder.
+    /// Passes the inputs of the arm, and the bytes that the host takes, to `recorder` from now on: see [`crate::session`].
+    /// Changes by [`Simulation::plant_mut`] and [`Simulation::set_paced`] are not recorded. A copy of the simulation has no
+    /// recorder.
     pub fn set_recorder(&mut self, recorder: impl SessionRecorder + 'static) {
         self.arm.set_recorder(recorder);
     }

@@ -76,12 +76,12 @@ fn damaged(_: postcard::Error) -> SnapshotError {
     SnapshotError::Damaged
 }
 
-/// Version and state, between the magic and the checksum.
+/// Puts version and state between the magic and the checksum.
 fn sealed(content: &[u8]) -> Vec<u8> {
     [MAGIC, content, &CHECKSUM.checksum(content).to_le_bytes()].concat()
 }
 
-/// Checks magic and checksum, and returns what is between them: the reverse of [`sealed`].
+/// Checks magic and checksum, and returns the bytes between them: the inverse of [`sealed`].
 fn content(bytes: &[u8]) -> Result<&[u8], SnapshotError> {
     let rest = bytes.strip_prefix(MAGIC).ok_or(SnapshotError::NotASnapshot)?;
     match rest.split_last_chunk() {

@@ -1,4 +1,4 @@
-//! The text form of numbers with at most three decimals, which are whole thousandths.
+//! The text form of whole thousandths: numbers with at most three decimals.
 
 use core::fmt::{self, Display, Formatter};
 

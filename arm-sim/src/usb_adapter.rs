@@ -1,10 +1,10 @@
-//! A simulated USB adapter between the servo bus and a computer: when the computer receives bytes of the servos.
+//! A simulated USB adapter between the servo bus and a computer. It delays the bytes from the servos to the computer.
 //!
 //! ```text
 //!   byte from the wire ──▶ block ──▶ the computer, when the block is full or its latency timer ends
 //! ```
 //!
-//! The same seed gives the same delays. There are no frames here.
+//! The same seed gives the same delays. This module does not interpret the bytes.
 
 use alloc::vec::Vec;
 use core::str::FromStr;

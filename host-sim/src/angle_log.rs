@@ -1,4 +1,5 @@
-//! A file of the true angles of the joints, for tests of a controller in another process, whose own measurements may be old.
+//! A file of the true angles of the joints, for tests of a controller in another process. The measurements of that controller may
+//! be old.
 //!
 //! Each line has the time in seconds since 1970, and seven angles in degrees. There is a line each 10 ms.
 

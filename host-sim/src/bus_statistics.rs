@@ -61,7 +61,7 @@ impl BusStatistics {
         }
     }
 
-    /// Counts the frames in bytes that are written to the port. The bytes must be whole frames.
+    /// Counts the questions, and the frames with goals, in bytes that are written to the port. The bytes must be whole frames.
     pub fn sent(&mut self, now: Instant, bytes: &[u8]) {
         let mut decoder = Decoder::new();
         for piece in bytes.chunks(Decoder::CAPACITY / 2) {
@@ -78,7 +78,7 @@ impl BusStatistics {
         }
     }
 
-    /// Counts bytes that were read from the port.
+    /// Counts bytes that were read from the port, and the answers in them with their round-trip times.
     pub fn received(&mut self, now: Instant, bytes: &[u8]) {
         self.bytes += bytes.len() as u64;
         for piece in bytes.chunks(Decoder::CAPACITY / 2) {

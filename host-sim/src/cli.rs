@@ -1,4 +1,4 @@
-//! The command line: options, exit statuses, and errors in one line. Scripts rely on all of these.
+//! The command line: its options, and its errors in one line. Scripts rely on both.
 
 use std::path::PathBuf;
 
@@ -16,7 +16,7 @@ use arm_sim::usb_adapter::Latency;
 /// The default chip id of a simulated arm: "SIM" and 1.
 const DEFAULT_CHIP_ID: &str = "53494d000001";
 
-/// The ids of servos: one value of an option.
+/// The ids of servos. With this alias, clap takes a list of ids as one value of an option.
 pub type Ids = Vec<u8>;
 
 /// The version. `cargo xtask dist` adds the commit.
@@ -204,7 +204,7 @@ fn chip_id(text: &str) -> Result<[u8; 6], &'static str> {
     Ok(id)
 }
 
-/// An error of clap in one line: its first sentence, its tip, and a reference to the help.
+/// An error of clap in one line: its first line, its tip, and a reference to the help.
 #[must_use]
 pub fn in_one_line(error: &clap::Error) -> String {
     let text = error.render().to_string();

@@ -44,7 +44,7 @@ impl RealClock {
     }
 }
 
-/// The time from `now` to `deadline`, but at most half of the longest absence, for calls of the operating system.
+/// The time from `now` to `deadline`, for calls of the operating system; at most half a second, so that a sleep is no stop.
 #[must_use]
 pub fn sleep_until(now: Instant, deadline: Instant) -> Timespec {
     let micros = (deadline - now).as_micros().min(LONGEST_ABSENCE.as_micros() / 2);

@@ -27,9 +27,9 @@ pub enum Eeprom {
 impl Eeprom {
     /// The default of a simulated arm.
     pub const SIMULATED: Self = Self::UsersOwn("eeprom.bin");
-    /// The default of an arm of real servos: its offsets are not those of the simulated arm.
+    /// The default of an arm of real servos. It has a file of its own, because its offsets are not valid for the simulated arm.
     pub const REAL_SERVOS: Self = Self::UsersOwn("servos.bin");
-    /// The default of an arm of the maker: its values have other encodings.
+    /// The default of an arm with the maker's controller. It has a file of its own, because its values have other encodings.
     pub const STOCK: Self = Self::UsersOwn("stock.bin");
 }
 
@@ -134,7 +134,7 @@ fn users_own(variable: impl Fn(&str) -> Option<PathBuf>) -> Result<PathBuf, Imag
     Ok(state.ok_or(ImageError::NoStateDirectory)?.join("7bot"))
 }
 
-/// Creates a blank image atomically. If another simulator has created one in the meantime, that one stays.
+/// Creates a blank image atomically. If another simulator has created an image in the meantime, its image stays.
 fn make_blank(path: &Path) -> io::Result<()> {
     let mut draft = path.as_os_str().to_owned();
     draft.push(format!(".{}.new", std::process::id()));

@@ -93,7 +93,7 @@ impl<F: NorFlash + Clone, C: ArmController> EventLoop<F, C> {
     /// Runs until a signal ends it.
     ///
     /// # Errors
-    /// The operating system fails: inotify, epoll, or the port of the last arm.
+    /// The operating system fails: inotify, epoll, accepting a client of a control socket, or the port of the last arm.
     pub fn run(mut self, clock: &mut VirtualClock, signals: &mut Signals) -> io::Result<()> {
         epoll::add(&self.epoll, signals.as_fd(), EventData::new_u64(SIGNALS), EventFlags::IN)?;
         loop {
@@ -103,7 +103,7 @@ impl<F: NorFlash + Clone, C: ArmController> EventLoop<F, C> {
             let is_busy = clock.is_in_lockstep() && self.is_host_line_busy();
             let events = self.wait(&clock.sleep(due, is_busy), &mut space)?;
             let now = clock.tick(due, is_busy);
-            // Signals come first: bytes that a client sends after a signal must reach the arm after it.
+            // Signals come first: bytes that a client sends after a signal must reach the arm after the signal's action.
             if self.apply_signals(signals, now) {
                 return Ok(());
             }
@@ -181,7 +181,7 @@ impl<F: NorFlash + Clone, C: ArmController> EventLoop<F, C> {
         }
     }
 
-    /// Polls the control socket of an arm.
+    /// Polls the control socket of an arm. If there was a request, the arm becomes due at once.
     fn poll_control(&mut self, number: usize, clock: &mut VirtualClock) -> io::Result<()> {
         let Some(entry) = self.arms.get_mut(number).filter(|entry| !entry.has_failed) else { return Ok(()) };
         let ArmEntry { arm, control: Some(control), due, .. } = entry else { return Ok(()) };

@@ -9,8 +9,8 @@ use arm_sim::flash::{Cells, Memory, SIZE};
 use embedded_storage::nor_flash::NorFlashErrorKind;
 use tracing::warn;
 
-/// A settings image of [`SIZE`] bytes in memory, and in a file if it has one. Every operation reaches the file before it
-/// returns, in the order of the calls. So a `kill -9` leaves the same states as a power cut.
+/// A settings image of [`SIZE`] bytes in memory, and in a file if it has one. Every write reaches the file before the
+/// call returns, in the order of the calls. So `kill -9` leaves the same states as a power cut.
 #[derive(Clone, Debug)]
 pub struct ImageFile {
     memory: Memory,

@@ -1,4 +1,4 @@
-//! The program `host-sim`: arms on pseudo-terminals until a signal ends them.
+//! The program `host-sim`: runs arms, or servos without a controller, until a signal ends it; or replays a session.
 
 mod failure;
 
@@ -111,7 +111,7 @@ fn run(options: &Options) -> Result<(), Failure> {
     }
 }
 
-/// The simulated servos without a controller.
+/// The simulated servos for a run without a controller. Refuses faults that only an arm with a controller can have.
 fn plant_alone(options: &Options, clock: &mut RealClock) -> Result<Plant, Failure> {
     match options.faults.iter().find(|fault| !fault.is_of_plant()) {
         Some(&fault) => Err(Failure::FaultOfController(fault)),
@@ -257,7 +257,8 @@ fn symlinks(
         .collect()
 }
 
-/// The control sockets of the arms. If a default socket cannot be created, the arm has none; an explicit path is an error.
+/// The control sockets of the arms. An arm whose default socket cannot be created has none. If the socket at an explicit path
+/// cannot be created, the program ends.
 fn control_sockets(
     options: &Options,
     numbers: &[Option<u16>],
@@ -312,7 +313,8 @@ fn flash(options: &Options, number: Option<u16>) -> Result<Flash<ImageFile>, Fai
     Ok(options.eeprom.as_ref().unwrap_or(&default).open(number)?)
 }
 
-/// Raises the limit of open files, 1024 by default. An arm needs three. If the limit is too low, opening the port fails.
+/// Raises the limit of open files to the highest value that the system allows. An arm needs three. If the limit is too low,
+/// opening the port fails.
 fn allow_as_many_files_as_possible() {
     let limit = getrlimit(Resource::Nofile);
     let _ = setrlimit(Resource::Nofile, Rlimit { current: limit.maximum, ..limit });

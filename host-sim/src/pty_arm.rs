@@ -22,7 +22,7 @@ use crate::snapshots::{SnapshotError, Snapshots};
 use tty_ports::clients::Clients;
 use tty_ports::pty::Pty;
 
-/// The most reports of faults that ended by themselves to keep.
+/// The most kept reports of faults that ended by themselves.
 const ENDED_FAULTS: usize = 16;
 
 /// An arm on a pseudo-terminal.
@@ -85,7 +85,7 @@ impl<F: NorFlash + Clone, C: ArmController> PtyArm<F, Plant, C> {
         self.simulation.is_host_line_busy()
     }
 
-    /// Logs the faults that ended by themselves since the last call.
+    /// Logs the faults that ended by themselves since the last call, and keeps their reports.
     pub fn log_ended_faults(&mut self) {
         let ended = self.simulation.take_ended_faults();
         if ended.is_empty() {
@@ -152,7 +152,7 @@ impl<F: NorFlash + Clone, B: ServoBus, C: ArmController> PtyArm<F, B, C> {
         self.is_strict = true;
     }
 
-    /// Do bytes pass between the client and the arm? Not at another baud rate, if that is checked.
+    /// Do bytes pass between the client and the arm? Always, unless the rate is checked and the client has another one.
     fn has_clients_rate(&self) -> io::Result<bool> {
         Ok(!self.is_strict || self.pty.baud()? == self.simulation.baud())
     }
@@ -195,8 +195,8 @@ impl<F: NorFlash + Clone, B: ServoBus, C: ArmController> PtyArm<F, B, C> {
             }
             was_emptied = self.pty.update_clients(clients)?;
         }
-        // If there was a moment without a client: with a client now, the bytes are from this next client; without one, they are
-        // from the last client.
+        // If the port was without a client for a moment: the bytes are from the next client if there is one now, otherwise from
+        // the last client.
         if was_emptied && self.pty.has_client() {
             self.simulation.host_disconnect();
         }
@@ -215,7 +215,8 @@ impl<F: NorFlash + Clone, B: ServoBus, C: ArmController> PtyArm<F, B, C> {
         Ok(self.simulation.deadline(self.pty.has_client()))
     }
 
-    /// Writes the arrived bytes to the client, or drops them if there is none. Returns whether the line has more room.
+    /// Writes the arrived bytes to the client, or drops them if no client can receive them. Returns whether this made room on the
+    /// line.
     fn deliver(&mut self) -> io::Result<bool> {
         let mut has_delivered = false;
         self.is_blocked = false;

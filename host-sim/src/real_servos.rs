@@ -4,7 +4,7 @@
 //!   client ◀──▶ Pty ◀──▶ SimulatedArm: the controller ◀──▶ BusLine ◀──▶ Serial ◀──▶ adapter, servos
 //! ```
 //!
-//! This runs in real time: a late caller does not catch up. If the adapter is unplugged, the program waits for it. Only
+//! This runs in real time: a late poll does not catch up. If the adapter is unplugged, the program waits for it. Only
 //! the controller sends frames to the servos, except at the end, when the servos are damped.
 
 use std::io;
@@ -45,7 +45,7 @@ const PAUSE: std::time::Duration = std::time::Duration::from_millis(5);
 /// Register 242 if all joints are missing.
 const ALL_MISSING: u8 = 0x7F;
 
-/// The port of the servos, and what happens to them at the end.
+/// The port and the settings of the servo bus.
 #[derive(Clone, Debug)]
 pub struct BusConfig {
     /// The adapter's port.
@@ -97,7 +97,7 @@ impl<F: NorFlash + Clone> RealServos<F> {
         }
     }
 
-    /// Runs until a signal ends it, and then damps the servos.
+    /// Runs until a signal or an error ends it. Then damps the servos, unless [`BusConfig::holds_on_exit`] is set.
     ///
     /// # Errors
     /// The operating system fails: the host's port, or poll(2).
@@ -113,14 +113,14 @@ impl<F: NorFlash + Clone> RealServos<F> {
             for action in signals.actions() {
                 match action {
                     SignalAction::End => return Ok(()),
-                    // This program cannot switch the supply of the servos.
+                    // The servos keep their power, because this program cannot switch their supply.
                     SignalAction::PowerCycle => self.arm.power_cycle(now),
                     SignalAction::RestartController => self.arm.restart_controller(now),
                     SignalAction::Unplug => Signals::warn_of_unplug(),
                 }
             }
             self.read_bus(now);
-            // Read the reports of inotify in each turn: poll(2) does not wait while there are unread ones.
+            // Read the reports of inotify in each turn, because poll(2) does not wait while a report is unread.
             if let Some(clients) = &mut self.clients {
                 clients.update()?;
             }

@@ -1,4 +1,4 @@
-//! Simulated servos on a unix socket, for a controller in another process: the firmware in an emulator.
+//! Simulated servos on a unix socket, for a controller in another process, such as the firmware in an emulator.
 //!
 //! One controller can be connected at a time. The servos keep their state when the next controller connects. A servo bus has
 //! no flow control: bytes that the controller does not read are lost.
@@ -19,7 +19,7 @@ use crate::private_socket::{PrivateSocket, SocketError, is_temporary};
 use crate::signals::{SignalAction, Signals};
 use arm_sim::plant::Plant;
 
-/// The servos' socket.
+/// A listening socket for one controller at a time, and the optional log of the true angles.
 #[derive(Debug)]
 pub struct ServoSocket {
     socket: PrivateSocket,

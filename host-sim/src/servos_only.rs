@@ -28,7 +28,7 @@ use tty_ports::symlink::{Symlink, SymlinkError};
 /// Bytes per read from the client.
 const PIECE: usize = 4_096;
 
-/// The bus and its adapter.
+/// The settings of the bus and its adapter.
 #[derive(Clone, Debug)]
 pub struct AdapterConfig {
     /// The path of a symbolic link to the port, which exists while the adapter is plugged in.
@@ -41,7 +41,7 @@ pub struct AdapterConfig {
     pub seed: u64,
 }
 
-/// Why the port does not work.
+/// Why the servos cannot be served.
 #[derive(Debug, thiserror::Error)]
 pub enum ServosOnlyError {
     /// The symbolic link cannot be created.
@@ -84,7 +84,7 @@ impl AdapterPort {
 }
 
 impl ServosOnly {
-    /// Plugs in the adapter of these servos.
+    /// Plugs in the adapter of these servos: creates the pseudo-terminal and the link.
     ///
     /// # Errors
     /// The pseudo-terminal or the link cannot be created.
@@ -110,7 +110,7 @@ impl ServosOnly {
     /// Serves clients until a signal ends it.
     ///
     /// # Errors
-    /// The operating system fails.
+    /// The operating system fails, or the link cannot be created when the adapter is plugged in again.
     pub fn serve(mut self, clock: &mut RealClock, signals: &mut Signals) -> Result<(), ServosOnlyError> {
         loop {
             let now = clock.now();
@@ -156,7 +156,7 @@ impl ServosOnly {
         self.write_client()
     }
 
-    /// Puts the bytes of the client on the wire, if it uses the servos' baud rate.
+    /// Puts the bytes of the client on the wire, if the client uses the servos' baud rate.
     fn read_client(&mut self, now: Instant) -> io::Result<()> {
         let Some(AdapterPort { pty, clients, .. }) = &mut self.port else { return Ok(()) };
         let mut bytes = [0; PIECE];

@@ -53,7 +53,7 @@ impl SnapshotError {
 pub struct Snapshots<T>(BTreeMap<String, T>);
 
 impl<T> Snapshots<T> {
-    /// No copies.
+    /// A store without copies.
     #[must_use]
     pub const fn new() -> Self {
         Self(BTreeMap::new())

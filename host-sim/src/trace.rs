@@ -57,7 +57,7 @@ impl std::fmt::Debug for Trace {
     }
 }
 
-/// One direction.
+/// One direction of the host link as text.
 struct LineTrace<D> {
     arrow: &'static str,
     deframer: Deframer<D>,

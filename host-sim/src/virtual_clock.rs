@@ -164,7 +164,7 @@ impl VirtualClock {
         if self.lockstep.is_some() { Err(FollowsClient) } else { Ok(()) }
     }
 
-    /// Lets this much virtual time pass as fast as possible. Returns the virtual time at the end.
+    /// Lets the next ticks pass this much virtual time as fast as possible. Returns the virtual time at its end.
     pub fn advance(&mut self, time: Duration) -> Instant {
         let end = self.now + time;
         self.advance_until = self.advance_until.max(end);

@@ -43,7 +43,7 @@ const STYLE_TEXT: &str = "createElement(\"template\")";
 /// The files of the package by their names.
 struct Package(BTreeMap<String, Vec<u8>>);
 
-/// The script of the editor: Blockly, its texts, the table of our blocks, and what connects them with the page.
+/// The script of the editor: Blockly, its texts, the table of our blocks, and the code that connects them with the page.
 pub(crate) fn script() -> TaskResult<String> {
     let package = Package::fetch()?;
     let mut script = package.core()?;
@@ -96,7 +96,8 @@ impl Package {
         Ok(String::from_utf8(self.bytes(name)?.to_vec())?)
     }
 
-    /// Blockly without blocks, changed so that it loads nothing, and its styles are text.
+    /// Blockly without blocks, with two changes: it contains its pictures instead of loading them, and its style elements become
+    /// template elements.
     fn core(&self) -> TaskResult<String> {
         let mut core = self.text(CORE)?;
         for (name, kind) in PICTURES {

@@ -15,7 +15,7 @@ use torture::text_table::TextTable;
 const TOLERANCE: u64 = 5;
 /// The committed value of a figure that varies from run to run.
 const VARIES: &str = "varies";
-/// The first lines of each file of budgets.
+/// The first lines of a file of budgets that `accept` writes.
 const INTRODUCTION: &str = "\
 # name | committed | at most
 # Less is better. `cargo xtask test` fails where a figure is more than 5 % above the one committed, or above the most
@@ -69,8 +69,8 @@ impl Budget {
     }
 }
 
-/// Prints the figures and compares them with `xtask/budgets/<file>.txt`. With `accept`, commits them instead, and keeps the
-/// limits.
+/// Prints the figures and compares them with `xtask/budgets/<file>.txt`. With `accept`, writes them into this file instead, and
+/// keeps the limits.
 pub(crate) fn check(file: &str, figures: &[Figure], accept: bool) -> TaskResult {
     let path = root().join("xtask/budgets").join(file).with_extension("txt");
     let text = fs::read_to_string(&path).unwrap_or_default();

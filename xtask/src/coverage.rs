@@ -5,8 +5,8 @@
 
 use crate::run::{TaskResult, run};
 
-/// The tests of the cores, and the lower limits in percent. It skips tests that repeat the same paths millions of times,
-/// which takes minutes with counters. Most of the missing regions are unreachable match arms: see docs/reliability.md.
+/// The tests of the cores, and the lower limits in percent. The run skips tests that repeat the same paths millions of times,
+/// because they take minutes with counters. Most of the missing regions are unreachable match arms: see docs/reliability.md.
 const RUN: &str = "llvm-cov --package protocol-core --package motion-core --package kinematics --summary-only \
                    --fail-under-lines 100 --fail-under-functions 100 --fail-under-regions 99 \
                    --ignore-filename-regex (arm-sim|flash-model|tests)/ \

@@ -1,5 +1,5 @@
-//! The table in docs/protocol.md of the tests for each decision, D1 to D29 and M1 to M12 except M11, generated from the names
-//! of the tests.
+//! Generates the table in docs/protocol.md that lists the tests of each decision: D1 to D29, M1 to M10 and M12. The names of the
+//! tests name the decisions.
 //!
 //! A test of D3 and M4 has a name like `d03_m04_...`.
 

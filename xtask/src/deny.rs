@@ -70,14 +70,14 @@ struct Sources {
     allow_registry: Vec<String>,
 }
 
-/// The only implemented value of a key.
+/// The only value of `multiple-versions` that is implemented here.
 #[derive(Deserialize)]
 #[serde(rename_all = "lowercase")]
 enum Warn {
     Warn,
 }
 
-/// The only implemented value of another key.
+/// The only value of `wildcards`, `unknown-registry` and `unknown-git` that is implemented here.
 #[derive(Deserialize)]
 #[serde(rename_all = "lowercase")]
 enum Deny {
@@ -100,7 +100,7 @@ pub(crate) fn rules() -> TaskResult {
     }
 }
 
-/// Checks licences, versions, sources and advisories.
+/// Checks licences, versions and sources, and the advisories if cargo-deny and its database are available.
 pub(crate) fn check() -> TaskResult {
     rules()?;
     if succeeds("deny fetch db") {
@@ -117,7 +117,7 @@ fn succeeds(words: &str) -> bool {
     program.status().is_ok_and(|status| status.success())
 }
 
-/// The packages in the builds for all targets, each version once, with our own.
+/// The packages in the builds for all targets, each version once, including our own packages.
 fn packages(graph: &Graph) -> TaskResult<Vec<Package>> {
     let mut found = BTreeMap::new();
     for manifest in MANIFESTS {
@@ -151,7 +151,7 @@ impl DenyRules {
         packages.iter().flat_map(of_package).chain(unused).collect()
     }
 
-    /// A licence is allowed for all crates or for this one.
+    /// The violation, if the licence is allowed neither for all crates nor for this one.
     fn license(&self, package: &Package) -> Option<String> {
         let Some(license) = &package.license else {
             return Some("has no licence".to_owned());
@@ -166,7 +166,7 @@ impl DenyRules {
         (!expression.evaluate(is_allowed)).then(|| format!("licence `{license}` is not allowed"))
     }
 
-    /// A dependency comes from an allowed registry, never from a git repository.
+    /// The violation, if a dependency does not come from an allowed registry. No git repository is allowed.
     fn source(&self, package: &Package) -> Option<String> {
         let source = package.source.as_ref()?;
         let registry = source.strip_prefix("registry+").or_else(|| source.strip_prefix("sparse+"));
@@ -175,7 +175,7 @@ impl DenyRules {
         (!is_allowed).then(|| format!("source `{source}` is not allowed"))
     }
 
-    /// Our packages must restrict the versions of their dependencies: `*` is forbidden.
+    /// The violation, if a package of ours allows any version (`*`) of a dependency. `allow-wildcard-paths` exempts folders.
     fn wildcard(&self, package: &Package) -> Option<String> {
         let is_exempt =
             |dependency: &&Dependency| dependency.path.is_some() && self.bans.allow_wildcard_paths;

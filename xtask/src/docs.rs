@@ -17,7 +17,7 @@ pub(crate) fn write() -> TaskResult {
     Ok(())
 }
 
-/// Fails if a file has another content.
+/// Fails if a file differs from its generated content.
 pub(crate) fn check() -> TaskResult {
     for (path, content) in
         GENERATORS.iter().map(|generate| generate()).collect::<TaskResult<Vec<_>>>()?.concat()

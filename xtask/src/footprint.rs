@@ -77,7 +77,7 @@ pub(crate) fn stack_of_path(linked: &ChipProgram) -> TaskResult<u64> {
     with_program(linked, |program| Ok(CallGraph::of(program)?.depth(program.address_of(FEED)?)?.bytes))
 }
 
-/// The size of a program minus that of the program with a server that does nothing.
+/// The size of a program minus the size of the program with a server that does nothing.
 pub(crate) fn flash_of_path(linked: &ChipProgram) -> TaskResult<u64> {
     let all = with_program(linked, |program| Ok(flash(program)))?;
     let nothing = ChipProgram { name: NOTHING, profile: linked.profile };

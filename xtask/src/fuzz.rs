@@ -117,7 +117,7 @@ fn build() -> TaskResult<PathBuf> {
     Ok(folder.join(host).join("release"))
 }
 
-/// The target triple of this machine. As an explicit target, it keeps the flags from build scripts and macros.
+/// The target triple of this machine. With an explicit target, cargo does not apply the flags to build scripts and macros.
 fn host() -> TaskResult<String> {
     let output = Command::new("rustc").arg("-vV").current_dir(root()).output()?;
     let output = String::from_utf8(output.stdout)?;

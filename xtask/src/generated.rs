@@ -4,13 +4,13 @@ use std::fs;
 
 use crate::run::{TaskResult, root};
 
-/// The path of a file from the root of the workspace, and what it has to contain.
+/// The path of a file from the root of the workspace, and its required content.
 pub(crate) type GeneratedFile = (String, Vec<u8>);
 
 /// The last line of every generated section.
 const END: &str = "<!-- end -->\n";
 
-/// A document with another content of the section that begins after the line `begin`.
+/// The document with `content` in the section that begins after the line `begin`.
 pub(crate) fn with_section(document: &str, begin: &str, content: &str) -> TaskResult<Vec<GeneratedFile>> {
     let text = fs::read_to_string(root().join(document))?;
     let replaced =

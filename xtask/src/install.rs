@@ -1,4 +1,4 @@
-//! Installs the tools that the steps of `cargo xtask test` need, unless they are installed.
+//! Installs the tools that `cargo xtask test` and the trial of a release need, unless they are installed.
 
 use std::process::{Command, Stdio};
 
@@ -12,7 +12,7 @@ struct Tool {
     arguments: &'static [&'static str],
     /// Its packages in Debian and Ubuntu.
     package: &'static str,
-    /// Its purpose.
+    /// Its purpose, as the end of a sentence: "runs the Python package".
     purpose: &'static str,
 }
 
@@ -37,7 +37,7 @@ const TOOLS: [Tool; 10] = [
     tool("x86_64-w64-mingw32-gcc", "gcc-mingw-w64-x86-64", "links the programs for Windows"),
 ];
 
-/// What makes and tries a release.
+/// The tools that make and try a release.
 const RELEASE_TOOLS: [Tool; 6] = [
     tool("dpkg-deb", "dpkg", "makes the Debian package"),
     tool("mmdebstrap", "mmdebstrap", "makes the bare system on which a release is tried"),
@@ -54,7 +54,7 @@ pub(crate) fn all() -> TaskResult {
     install_missing(&TOOLS)
 }
 
-/// Installs the missing tools that try a whole release.
+/// Installs the missing tools that make and try a release.
 pub(crate) fn for_release() -> TaskResult {
     install_missing(&RELEASE_TOOLS)
 }

@@ -8,18 +8,19 @@ use crate::python::{copy_of, folder, wheel};
 use crate::run::{TaskResult, build_host_sim, build_image, root, run_command};
 use crate::venv::{self, interpreter, pip};
 
-/// LeRobot without what it depends on: some gigabytes, of which its base classes need little.
+/// LeRobot, installed without its dependencies. They take some gigabytes, and the base classes need few of them.
 const LEROBOT: &str = "lerobot==0.6.1";
-/// What the base classes import. They use torch in annotations only: the tests have an empty module of this name.
+/// The packages that the base classes import. The base classes use torch in annotations only, so the tests have an empty module
+/// of this name.
 const BASE_PACKAGES: [&str; 5] =
     ["draccus==0.11.6", "numpy==2.2.6", "huggingface-hub==1.33.0", "packaging==25.0", "tqdm==4.70.1"];
 /// All of LeRobot that its commands for robots need.
 const WHOLE: &str = "lerobot[core-scripts]==0.6.1";
-/// What runs the tests.
+/// The packages that run the tests and check the types.
 const TEST_PACKAGES: [&str; 2] = ["pytest==9.2.0", "mypy==2.4.1"];
-/// The free disk that the whole installation needs, in GiB: 3 for pip's downloads, and 6 that it keeps.
+/// The free disk that the whole installation needs, in GiB: 3 for pip's downloads, and 6 for the installed packages.
 const NEEDED_GIB: u64 = 9;
-/// Types and behaviour of the plugin, with the base classes of LeRobot.
+/// Checks types and behaviour of the plugin, with the base classes of LeRobot.
 pub(crate) fn check() -> TaskResult {
     let python = environment("lerobot-base")?;
     run_command(pip(&python).args(["--no-deps", LEROBOT]))?;
@@ -32,7 +33,7 @@ pub(crate) fn check() -> TaskResult {
     run_command(&mut pytest(&python, &tests))
 }
 
-/// LeRobot's own commands with the plugin. The first run installs all of LeRobot.
+/// Tests LeRobot's own commands with the plugin. The first run installs all of LeRobot.
 pub(crate) fn commands() -> TaskResult {
     let python = environment("lerobot-whole")?;
     if !python.with_file_name("lerobot-record").exists() {
@@ -74,7 +75,7 @@ fn need_disk() -> TaskResult {
     .into())
 }
 
-/// The package and the plugin, without what they depend on.
+/// Installs the package and the plugin, without their dependencies.
 fn install_plugin(python: &Path) -> TaskResult {
     let copy = folder().join("lerobot-plugin");
     copy_of(&plugin(), &copy)?;
@@ -83,7 +84,7 @@ fn install_plugin(python: &Path) -> TaskResult {
 
 fn module(python: &Path, name: &str) -> Command {
     let mut command = Command::new(python);
-    // Not in the folder of the sources, so that those are not imported.
+    // Run it outside the folder of the sources, so that Python does not import them.
     command.args(["-m", name]).current_dir(folder());
     command
 }

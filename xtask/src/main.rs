@@ -168,7 +168,7 @@ fn run_task(task: &Task) -> TaskResult {
     }
 }
 
-/// Builds the image and the simulator, and runs them.
+/// Builds the image and the simulator unless the options forbid it, and runs them.
 fn emulate(options: &emulator::EmulateArgs) -> TaskResult {
     if !options.no_build {
         emulator::need_qemu()?;

@@ -39,7 +39,7 @@ print(f"{poses} poses, MuJoCo {mujoco.__version__}")
 for what, error in worst.items():
     print(f"{what}: at most {error:.2e} mm")
 
-# Motors drive the last pose from the straight one: the loop stays closed, and the arm arrives.
+# The actuators drive the arm from the straight pose to the last pose: the loop stays closed, and the arm arrives.
 mujoco.mj_resetData(model, data)
 data.ctrl[:] = angles
 opening = 0.0

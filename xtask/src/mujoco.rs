@@ -1,4 +1,4 @@
-//! The arm's model in MuJoCo: its forward kinematics must be those of `kinematics`.
+//! The arm's model in MuJoCo: its forward kinematics must agree with `kinematics`.
 
 use std::fmt::Write;
 use std::fs;
@@ -18,7 +18,8 @@ const POSES: usize = 5_000;
 /// The script that compares.
 const SCRIPT: &str = include_str!("mujoco.py");
 
-/// Installs MuJoCo into an environment of its own, and compares many poses. Fails above 0.01 mm.
+/// Installs MuJoCo into an environment of its own, and compares many poses. Fails above 0.01 mm, or if the actuators of the model
+/// do not drive the arm to a pose.
 pub(crate) fn check() -> TaskResult {
     let folder = root().join("target/mujoco");
     let python = venv::with_packages(&folder, || Ok("python3".into()), &[PACKAGE])?;
@@ -51,7 +52,7 @@ fn line(degrees: [f64; 6]) -> String {
     numbers.map(|number| format!("{number:e}")).collect::<Vec<_>>().join(" ")
 }
 
-/// From millimetres with x to the right and y forward to metres with x forward and y to the left.
+/// Converts from millimetres with x to the right and y forward to metres with x forward and y to the left.
 fn rep_103(point: Vector<f64>) -> [f64; 3] {
     [point.y, -point.x, point.z].map(|number| number / 1000.0)
 }

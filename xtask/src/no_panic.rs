@@ -1,7 +1,7 @@
 //! `cargo xtask no-panic`: the cores, linked for the chip, and the firmware contain no reachable panic.
 //!
-//! The linker leaves out what nothing refers to. So if the program contains the panic handler, or a function of `core` that
-//! leads to it, some line can panic. The debug information shows which one.
+//! The linker removes code that nothing refers to. So if the program contains the panic handler, or a function of `core` that
+//! leads to it, some line can panic. The debug information shows which line.
 
 use crate::run::{TaskResult, link};
 use linked_image::{Program, SourceLine, Symbol};
@@ -40,7 +40,7 @@ struct Call<'a> {
     lines: Vec<SourceLine>,
 }
 
-/// The functions that panic, without those that only [`EXEMPT`] packages and other panics call.
+/// The functions that panic, except functions that only [`EXEMPT`] packages and other panics call.
 fn panics<'a>(program: &'a Program<'_>) -> TaskResult<Vec<Panic<'a>>> {
     let mut found = Vec::new();
     for symbol in program.symbols.iter().filter(|symbol| is_panic(symbol)) {
@@ -52,8 +52,8 @@ fn panics<'a>(program: &'a Program<'_>) -> TaskResult<Vec<Panic<'a>>> {
     Ok(found)
 }
 
-/// The calls of a panic that are not exempt, and whether all its calls are from panics or exempt. A panic without calls is
-/// not exempt, because its address must be in use.
+/// The calls of a panic that come neither from other panics nor from [`EXEMPT`] packages, and whether the panic has calls, but
+/// none of these. A panic without calls counts as reachable, because its address must be in use.
 fn calls_to<'a>(program: &'a Program<'_>, panic: &Symbol) -> TaskResult<(Vec<Call<'a>>, bool)> {
     let addresses = program.calls_to(panic.address);
     let mut calls = Vec::new();

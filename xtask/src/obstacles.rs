@@ -1,7 +1,7 @@
-//! `cargo xtask obstacles`: what becomes of the arm at obstacles, with the image in the emulator as the controller.
+//! `cargo xtask obstacles`: how the arm behaves at obstacles, with the image in the emulator as the controller.
 //!
-//! The experiments and tables are those of `torture obstacles`, a few of them. They run in real time, so a busy machine
-//! increases the figures.
+//! It makes a few of the experiments of `torture obstacles`, and prints the same tables. The experiments run in real time, so a
+//! busy machine increases the figures.
 
 use std::error::Error;
 

@@ -8,7 +8,7 @@ use crate::run::{TaskResult, build_image, empty_folder, root, run_command, targe
 use crate::venv::{self, Version, pip};
 
 /// The packages from PyPI, at versions that were tried. gymnasium, mujoco and numpy are optional for users, but have tests;
-/// mcap and rosbags read what the package writes.
+/// mcap and rosbags read the files that the package writes.
 const PACKAGES: [&str; 10] = [
     "maturin==1.16.0",
     "gymnasium==1.4.0",
@@ -21,12 +21,12 @@ const PACKAGES: [&str; 10] = [
     "numpy==2.4.6; python_version >= '3.11'",
     "numpy==2.2.6; python_version < '3.11'",
 ];
-/// For the example with several processes.
+/// The package for the example with several processes.
 const RAY: &str = "ray==2.51.1";
 /// The oldest version that the package supports.
 pub(crate) const OLDEST: Version = (3, 10);
 
-/// Builds the wheel, and tests it with all interpreters on PATH.
+/// Builds the wheel, and tests it with each version of Python on PATH from [`OLDEST`] on.
 pub(crate) fn check() -> TaskResult {
     let wheel = wheel()?;
     // The tests of block programs run on the image in the emulator.
@@ -39,7 +39,7 @@ pub(crate) fn check() -> TaskResult {
     Ok(())
 }
 
-/// The example with Ray: two workers do what one process does. With the first interpreter on PATH.
+/// Tests the example with Ray, in which two workers do the work of one process. Uses the first interpreter on PATH.
 pub(crate) fn ray() -> TaskResult {
     let (version, program) = first_interpreter()?;
     let python = environment(version, program)?;
@@ -68,7 +68,7 @@ pub(crate) fn folder() -> PathBuf {
     target_directory().join("python")
 }
 
-/// The environment of a version.
+/// The Python of the environment for a version.
 fn environment((major, minor): Version, program: PathBuf) -> TaskResult<PathBuf> {
     venv::with_packages(&folder().join(format!("{major}.{minor}")), || Ok(program), &PACKAGES)
 }
@@ -85,7 +85,7 @@ fn build_wheel(python: &Path) -> TaskResult<PathBuf> {
 }
 
 /// Checks types and behaviour of the installed package. Runs outside the folder of the sources, so that Python does not
-/// import those.
+/// import the sources.
 fn test(python: &Path, wheel: &Path) -> TaskResult {
     run_command(pip(python).args(["--force-reinstall", "--no-deps"]).arg(wheel))?;
     let module = |words: &[&str]| {
@@ -110,7 +110,7 @@ fn pytest(python: &Path, tests: &str) -> Command {
     command
 }
 
-/// A copy of a package: setuptools would leave files beside the sources.
+/// Copies a package, because setuptools would leave files beside the sources.
 pub(crate) fn copy_of(package: &Path, copy: &Path) -> TaskResult {
     empty_folder(copy)?;
     run_command(Command::new("cp").arg("-r").arg(package.join(".")).arg(copy))

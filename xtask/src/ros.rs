@@ -28,9 +28,9 @@ const PACKAGES: [&str; 15] = [
     "pytest==9.2.0",
     "pytest-xdist==3.8.0",
 ];
-/// Processes that run tests, most of which wait for an arm.
+/// Number of processes that run tests. Most tests wait for an arm.
 const PROCESSES: &str = "2";
-/// The network of the tests has only this computer, and needs no administrator.
+/// The commands that start the network of the tests. It has only the loopback interface, and needs no administrator.
 const NETWORK: &str = "ip link set lo up && exec \"$@\"";
 
 /// Installs and tests the packages.
@@ -53,7 +53,7 @@ fn folder() -> PathBuf {
     target_directory().join("ros")
 }
 
-/// The types of the installed package.
+/// Checks the types of the installed package.
 fn check_types(python: &Path) -> TaskResult {
     let mut command = Command::new(python);
     command.args(["-m", "mypy", "--config-file"]).arg(root().join("ros/mypy.ini"));

@@ -5,7 +5,8 @@ use arm_model::{Body, Mesh};
 use crate::generated::GeneratedFile;
 use crate::run::TaskResult;
 
-/// The links with a mesh, and its body. The description that the node publishes names the files by their links.
+/// The links with a mesh, each with the body of this mesh. The files have the names of the links, as in the description that the
+/// node publishes.
 const MESHES: [(&str, Body); 9] = [
     ("base_link", Body::Base),
     ("turret", Body::Turret),

@@ -1,4 +1,4 @@
-//! Runs the programs that the tasks consist of.
+//! Builds and runs programs for the tasks.
 
 use std::path::Path;
 use std::process::Command;
@@ -11,9 +11,9 @@ pub(crate) use emulator::process::{ChildProcess, TaskResult, wait_for};
 pub(crate) const BROWSER: &str = "wasm32-unknown-unknown";
 
 /// The packages whose programs and tests are built for the host. All commands select the same packages, because another
-/// selection may enable other features, and then their dependencies are built again. The tasks are built before.
+/// selection may enable other features, and then their dependencies are built again. xtask is built before.
 pub(crate) const TESTED: &str = "--workspace --exclude footprint --exclude xtask";
-/// The packages with all their targets for the host.
+/// The packages that are linted and documented for the host.
 pub(crate) const CHECKED: &str = "--workspace --exclude footprint --exclude firmware-stm32";
 
 /// Runs cargo with these arguments, in the root of the workspace.

@@ -1,6 +1,7 @@
 //! `cargo xtask sag`: measures how far the arm sags during a failure, with the image in the emulator as the controller.
 //!
-//! The failures and the table are those of `torture sag`. It measures in real time, so a busy machine increases the figures.
+//! The failures and the table are the same as in `torture sag`. This task measures in real time, so a busy machine
+//! increases the figures.
 
 use arm_sim::plant::Plant;
 use arm_sim::servo::ServoFault;

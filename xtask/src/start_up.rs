@@ -1,5 +1,5 @@
-//! `cargo xtask start-up`: checks the accesses of the image to the chip's registers before its loop begins. The rules follow
-//! from the chip, and the emulator does not show their violation (RM0090, ES0182, DS8626).
+//! `cargo xtask start-up`: checks the accesses of the image to the chip's registers before its loop begins. The chip demands the
+//! checked rules (RM0090, ES0182, DS8626). An image that violates them still runs in the emulator.
 //!
 //! The emulator has no GPIO, clock tree, watchdog, supply monitor or flash controller. It logs the accesses to them, and reads
 //! return 0.

@@ -52,7 +52,7 @@ pub(crate) const fn long(heading: &'static str, act: fn() -> TaskResult) -> Test
     TestStep { heading, scope: TestScope::Long, act }
 }
 
-/// The work of the step with this heading, which a process of its own does: see [`execute`].
+/// Does the work of the step with this heading, in the process that [`execute`] started for it.
 pub(crate) fn act_of(stages: &[Stage], heading: &str) -> TaskResult {
     let mut steps = stages.iter().copied().flatten().copied().flatten();
     let step = steps.find(|step| step.heading == heading).ok_or("there is no such step")?;
@@ -84,8 +84,8 @@ pub(crate) fn execute(step: &TestStep, output: Option<File>) -> (Times, TaskResu
     }
 }
 
-/// Runs the steps of this scope until one fails. Prints the table of times before the last step, so that its output is at the
-/// end.
+/// Runs the steps of this scope until one fails. Prints the table of times before the last stage, so that the output of that
+/// stage is at the end.
 pub(crate) fn run(
     stages: &[Stage],
     scope: TestScope,
@@ -112,7 +112,7 @@ pub(crate) fn run(
                     .iter()
                     .map(|lane| scope.spawn(|| run.lane(lane, true).map_err(|why| why.to_string())))
                     .collect();
-                // All lanes are waited for, and the first failure is reported.
+                // Wait for all lanes. The first failure is reported.
                 let outcomes: Vec<_> = running.into_iter().map(thread::ScopedJoinHandle::join).collect();
                 outcomes
                     .into_iter()
@@ -132,7 +132,7 @@ struct StepRun<E> {
 }
 
 impl<E: Fn(&TestStep, Option<File>) -> (Times, TaskResult)> StepRun<E> {
-    /// Runs the steps of a lane, until one of any lane fails.
+    /// Runs the steps of a lane, until a step of any lane fails.
     fn lane(&self, steps: &[&'static TestStep], is_beside_others: bool) -> TaskResult {
         for step in steps {
             if self.has_failed.load(Ordering::Relaxed) {

@@ -1,7 +1,7 @@
 //! The system tests on other kinds of arms than the simulator.
 //!
-//! A test is skipped by its name if the arm lacks a capability. A test that is skipped without need, or not skipped, fails:
-//! see `with_arm` in `tests/src/test_arm.rs`.
+//! If the arm lacks a capability, the tests that need it are skipped by their names. Such a test fails if its name is missing
+//! here: see `with_arm` in `tests/src/test_arm.rs`.
 
 use crate::run::{TESTED, TaskResult, run};
 

@@ -43,7 +43,7 @@ const LONG_FUZZ_SECONDS: u64 = 300;
 const STAGES: &[Stage] = &[
     &[&[quick("tools that the steps need", install::all), quick("format", || cargo("fmt --all --check"))]],
     &[
-        // Steps that share the build directory of the tests,
+        // These steps share the build directory of the tests.
         &[
             quick("lints, host", || cargo(&format!("clippy {CHECKED} --all-targets -- -D warnings"))),
             quick("lints, host tests of the firmware", || {
@@ -63,7 +63,7 @@ const STAGES: &[Stage] = &[
             quick("the page builds within its budget", web::build),
             quick("programs and tests", || cargo(&format!("test {TESTED} --no-run"))),
         ],
-        // beside steps with other build directories: cargo allows one build at a time in each.
+        // These steps run beside them in other build directories: cargo allows one build at a time in each.
         &[
             quick("lints, Windows and macOS", dist::lint_other_systems),
             whole("no panic is reachable", no_panic::check),
@@ -71,7 +71,7 @@ const STAGES: &[Stage] = &[
         ],
     ],
     &[
-        // Steps that compute (the counts come after the first tests on an emulated chip),
+        // These steps compute. The counts come after the first tests on an emulated chip.
         &[
             whole("start-up of the image", start_up::check),
             whole("recorded sessions, natively and in a WebAssembly module", replays::short),
@@ -79,7 +79,7 @@ const STAGES: &[Stage] = &[
             whole("worlds with injected faults", torture::short),
             whole("fuzzing", fuzz::fixed),
         ],
-        // beside steps that mostly wait for an arm, a browser or a network.
+        // These steps run beside them, and mostly wait for an arm, a browser or a network.
         &[
             whole("system tests, the image for the arm in an emulator", || {
                 system_tests::run_on(&system_tests::EMULATOR)
@@ -127,7 +127,7 @@ const STAGES: &[Stage] = &[
     &[&[quick("every command with every fault of the simulator", || test("--test faults"))]],
 ];
 
-/// Runs these tests with more threads than processors, because most tests with an arm wait for it.
+/// Runs these tests in 8 threads, even with fewer processors, because most tests with an arm wait for it.
 fn test(which: &str) -> TaskResult {
     run("cargo", &format!("test {TESTED} {which}"), &[("RUST_TEST_THREADS", "8")])
 }

@@ -13,10 +13,10 @@ use crate::run::TaskResult;
 /// The length of a tick in /proc: 1/100 s on every Linux (USER_HZ).
 const TICK: Duration = Duration::from_millis(10);
 
-/// How long the processes of a step may outlive it.
+/// How long the processes of a step may outlive the step.
 const PATIENCE: Duration = Duration::from_secs(10);
 
-/// The times of a child process with its own children.
+/// The times of a child process or of work in this process, with the child processes.
 #[derive(Clone, Copy)]
 pub(crate) struct Times {
     /// Real time.
@@ -50,13 +50,14 @@ impl Times {
     }
 }
 
-/// Makes this process the parent of descendants that lose theirs, such as those of a browser: [`wait_for_orphans`] counts them.
+/// Makes this process the parent of descendants that lose their parent, such as the processes of a browser. Then their processor
+/// time counts, after [`wait_for_orphans`].
 #[cfg(target_os = "linux")]
 pub(crate) fn adopt_orphans() -> TaskResult {
     Ok(rustix::process::set_child_subreaper(Some(rustix::process::getpid()))?)
 }
 
-/// Other systems have nothing like it.
+/// Does nothing: other systems have no such mechanism.
 #[cfg(not(target_os = "linux"))]
 pub(crate) fn adopt_orphans() -> TaskResult {
     Ok(())

@@ -23,7 +23,7 @@ impl Default for Trials {
 }
 
 impl Trials {
-    /// Adds a trial.
+    /// Adds a row for a trial.
     pub(crate) fn add(&mut self, trial: &str, number: &str, failures: &str) {
         self.table.add([trial, number, failures]);
     }
@@ -58,7 +58,7 @@ impl Trials {
         }
     }
 
-    /// Prints the table of trials. Fails if one of them failed.
+    /// Prints the table of trials. Fails if a trial failed.
     pub(crate) fn finish(&self, seed: u64) -> TaskResult {
         println!("\n{}\nseed {seed}", self.table);
         if self.has_failure { Err("a trial failed: see the table".into()) } else { Ok(()) }

@@ -7,7 +7,7 @@ use std::{env, fs};
 
 use crate::run::{TaskResult, run_command};
 
-/// Installs packages as pip does, but asks PyPI for many of them at once. A version that was tried.
+/// The program that installs the packages, at a version that was tried. It asks PyPI for many packages at once, unlike pip.
 const INSTALLER: &str = "uv==0.13.9";
 
 /// Programs to look for on PATH.
@@ -33,7 +33,7 @@ pub(crate) fn of_this_computer() -> Vec<(Version, PathBuf)> {
     with_versions(INTERPRETERS.into_iter().map(PathBuf::from).chain(of_pyenv))
 }
 
-/// A program of one of these versions, for what needs it.
+/// An interpreter of one of these versions. `what` names its user in the error.
 pub(crate) fn interpreter(what: &str, versions: RangeInclusive<Version>) -> TaskResult<PathBuf> {
     let found = of_this_computer().into_iter().find(|(version, _)| versions.contains(version));
     let ((major, first), (_, last)) = versions.into_inner();
@@ -64,8 +64,8 @@ fn with_versions(programs: impl Iterator<Item = PathBuf>) -> Vec<(Version, PathB
     found
 }
 
-/// The Python of an environment in `folder` with these packages from PyPI. It is made anew, with the interpreter that `program`
-/// finds, if it does not work or the list has changed.
+/// The Python of an environment in `folder` with these packages from PyPI. If the environment does not work, or the list has
+/// changed, the environment is made anew with the interpreter that `program` finds.
 pub(crate) fn with_packages(
     folder: &Path,
     program: impl FnOnce() -> TaskResult<PathBuf>,

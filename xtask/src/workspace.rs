@@ -72,7 +72,7 @@ struct DependencyKind {
     kind: Option<String>,
 }
 
-/// What `cargo metadata` reports with these arguments.
+/// The report of `cargo metadata` with these arguments.
 pub(crate) fn metadata(arguments: &[&str]) -> TaskResult<Metadata> {
     let mut cargo = Command::new("cargo");
     cargo.args(["metadata", "--format-version", "1"]).args(arguments).current_dir(root());
@@ -104,7 +104,7 @@ impl Package {
         self.targets.iter().filter(is_root).map(|target| target.src_path.clone()).collect()
     }
 
-    /// The crates of the workspace that it depends on, without those of its tests.
+    /// The crates of the workspace that it depends on, without those that only its build or its tests use.
     pub(crate) fn uses(&self) -> BTreeSet<&str> {
         let is_normal = |dependency: &&Dependency| dependency.kind.is_none() && dependency.path.is_some();
         self.dependencies.iter().filter(is_normal).map(|dependency| dependency.name.as_str()).collect()
@@ -112,7 +112,7 @@ impl Package {
 }
 
 impl Resolve {
-    /// The ids of these packages, and of all that they contain, without what only builds or tests them.
+    /// The ids of these packages and of their direct and indirect dependencies, without build and test dependencies.
     pub(crate) fn parts<'a>(&'a self, mut open: Vec<&'a str>) -> BTreeSet<&'a str> {
         let mut found = BTreeSet::new();
         while let Some(id) = open.pop() {

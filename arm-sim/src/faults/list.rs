@@ -7,7 +7,7 @@ use protocol_core::time::Instant;
 
 use super::{ArmFault, FaultLocation, FaultReport, Obstacle};
 
-/// Reports of ended faults that are kept.
+/// The most reports of ended faults that are kept.
 const REPORTS: usize = 16;
 
 /// A fault, and when it ends by itself.
@@ -60,7 +60,7 @@ impl FaultList {
         taken
     }
 
-    /// When the next fault ends.
+    /// When the next fault ends by itself. `None`: no fault does.
     pub(crate) fn deadline(&self) -> Option<Instant> {
         self.0.iter().filter_map(|listed| listed.until).min()
     }

@@ -11,7 +11,7 @@ use crate::fault_count::FaultCount;
 use crate::plant::{HIGHEST_STIFFNESS, Plant, STRONGEST_PUSH, Thing, Wall};
 use crate::thousandths::Thousandths;
 
-/// Something that a joint meets. Its count is the number of milliseconds in which the joint touched it.
+/// Something that a joint meets. Its count is the number of milliseconds in which the joint touched it or was pushed by it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Obstacle {
@@ -43,7 +43,7 @@ impl Obstacle {
         !matches!(self, Self::Thing(_)) || joint.number() == 7
     }
 
-    /// Puts it in the way of a joint.
+    /// Puts the obstacle in the way of a joint.
     pub(super) fn apply(self, joint: Joint, plant: &mut Plant) {
         match self {
             Self::Wall(wall) => plant.set_wall(joint, Some(wall)),
@@ -52,7 +52,7 @@ impl Obstacle {
         }
     }
 
-    /// Takes it away.
+    /// Removes the obstacle from a joint.
     pub(super) fn remove(self, joint: Joint, plant: &mut Plant) {
         match self {
             Self::Wall(_) => plant.set_wall(joint, None),
@@ -61,7 +61,7 @@ impl Obstacle {
         }
     }
 
-    /// How long the joint touched the obstacle.
+    /// Milliseconds in which the joint touched the obstacle, or was pushed by it.
     pub(crate) fn count(self, joint: Joint, plant: &Plant) -> FaultCount {
         match self {
             Self::Wall(_) => plant.wall_count(joint),

@@ -1,4 +1,4 @@
-//! What disturbs an arm: faults of its servos, bus and supply, a hand, a weight in the gripper, and the power switch.
+//! Disturbances of an arm: faults of its servos, bus and supply, a hand, a weight in the gripper, and the power switch.
 
 use protocol_core::registers::Joint;
 use protocol_core::time::Instant;
@@ -31,27 +31,27 @@ impl Plant {
         self.rest_until = self.now;
     }
 
-    /// How often the fault of the supply took effect: the number of dips for `Dips`, otherwise of frames to the servos.
+    /// How often the fault of the supply took effect: in dips for [`SupplyFault::Dips`], otherwise in frames to the servos.
     #[must_use]
     pub const fn supply_fault_count(&self) -> FaultCount {
         self.supply.count()
     }
 
-    /// Puts this weight into the gripper, in grams, at most [`HEAVIEST_LOAD_G`]. 0 takes it away.
+    /// Sets the weight in the gripper, in grams, limited to [`HEAVIEST_LOAD_G`]. 0 removes the weight.
     pub fn set_load(&mut self, grams: u16) {
         self.load_g = grams.min(HEAVIEST_LOAD_G);
         self.update_weight();
     }
 
-    /// Scales the stall torque of all servos, and the friction and drag of their gears, in percent of those in
-    /// [`parameters`](crate::parameters): for arms that differ from each other.
+    /// Scales the stall torque of all servos, and the friction and drag of their gears, in percent of the values in
+    /// [`parameters`](crate::parameters). So simulated arms can differ from each other.
     pub fn scale_servos(&mut self, torque_percent: u16, friction_percent: u16) {
         for (servo, joint) in self.servos_mut().iter_mut().zip(Joint::ALL) {
             servo.set_parameters(&ServoParameters::of(joint).scaled(torque_percent, friction_percent));
         }
     }
 
-    /// The weight in the gripper, in grams: that of [`Plant::set_load`] and that of a carried object of the room.
+    /// The weight in the gripper, in grams: the sum of [`Plant::set_load`] and of the carried object of the room.
     #[must_use]
     pub const fn load_grams(&self) -> u16 {
         self.load_g + self.carried_g

@@ -1,6 +1,6 @@
-//! The inertia of the arm: what each joint has to accelerate in a pose.
+//! The inertia of the arm about each joint in a pose.
 //!
-//! The masses and lengths are those of [`weight`](super::weight). A joint sees the other joints as rigid: a joint that
+//! The masses and lengths are the same as in [`weight`](super::weight). A joint sees the other joints as rigid: a joint that
 //! accelerates does not turn its neighbours. All values are integers.
 
 use protocol_core::registers::JOINTS;

@@ -1,4 +1,4 @@
-//! What the arm meets: walls, a hand that pushes, a thing between the claws, and alarms that are forced on its servos.
+//! Obstacles of the arm: walls, a hand that pushes, a thing between the claws. Also alarms that are forced on its servos.
 //!
 //! Angles are true angles, without any offset, in thousandths of a degree. Joint 7 closes towards smaller angles.
 
@@ -14,7 +14,7 @@ use crate::servo::{Servo, Trip};
 pub const HIGHEST_STIFFNESS: u16 = 5_000;
 /// The greatest torque of a hand, in millinewton metres.
 pub const STRONGEST_PUSH: i16 = 10_000;
-/// The claws drop a thing that they have touched when they open this far beyond it, in thousandths of a degree. Assumed.
+/// When the claws open this far beyond a thing that they have touched, they drop it. In thousandths of a degree, assumed.
 const DROP_DISTANCE: i64 = 2_000;
 /// The joint of the claws.
 const CLAW: Joint = Joint::ALL[6];
@@ -63,7 +63,7 @@ impl Plant {
         self.servo_mut(CLAW).into_iter().for_each(|servo| servo.set_thing(obstacle));
     }
 
-    /// Drops what is in the gripper: the thing, the weight, and an object of the room.
+    /// Drops everything that the tool holds: the thing, the weight, and an object of the room.
     pub fn drop_thing(&mut self) {
         self.world.iter_mut().for_each(|world| world.tear_off());
         self.set_thing(None);
@@ -83,7 +83,7 @@ impl Plant {
         self.servo_mut(joint).into_iter().for_each(|servo| servo.trip(trip));
     }
 
-    /// Has the overload protection of a joint's servo switched it off?
+    /// Is an overload latched in a joint's servo? Register 19 of the servo tells whether an overload switches the motor off.
     #[must_use]
     pub fn is_overloaded(&self, joint: Joint) -> bool {
         self.servo(joint).is_some_and(Servo::is_overloaded)

@@ -5,8 +5,8 @@
 //!   positions, velocities, loads ◀──┘
 //! ```
 //!
-//! Such a joint meets what is in the other simulation. The weight, walls and hands of this simulation, and faults that block a
-//! servo, have no effect on it. Alarms, heat, the supply and all faults of the servo bus still act on it.
+//! Such a joint meets the obstacles of the other simulation. The weight, walls and hands of this simulation, and faults that
+//! block a servo, have no effect on it. Alarms, heat, the supply and all faults of the servo bus still act on it.
 
 use protocol_core::registers::Joint;
 
@@ -26,7 +26,7 @@ pub struct OutsideState {
 
 impl Plant {
     /// Sets the present state of a joint from another simulation, which moves the joint from now on. With `None` this simulation
-    /// moves the joint again. Until the next call the joint goes on at the velocity of this one.
+    /// moves the joint again. Until the next call, the joint continues at the velocity in `state`.
     pub fn measure(&mut self, joint: Joint, state: Option<OutsideState>) {
         let scale = AngleScale::of(joint);
         let Some(servo) = self.servo_mut(joint) else { return };

@@ -46,8 +46,8 @@ impl AngleScale {
         torque_per_degree * self.span.abs() / i64::from(SPAN)
     }
 
-    /// Converts a torque that is positive towards greater angles to one that is positive towards more counts. The same
-    /// conversion goes back.
+    /// Converts a torque that is positive towards greater angles to one that is positive towards more counts. The conversion is
+    /// its own inverse.
     pub(crate) const fn torque_towards_counts(self, torque: i64) -> i64 {
         if self.span < 0 { -torque } else { torque }
     }
@@ -78,17 +78,17 @@ impl SineAndCosine {
     }
 }
 
-/// The directions of the parts of the arm that have weight.
+/// The sines and cosines of the angles that determine the directions of the parts with weight.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct JointSines {
-    /// The rear arm above the horizontal.
+    /// The angle of the rear arm above the horizontal.
     pub(crate) rear: SineAndCosine,
-    /// The forearm below the horizontal.
+    /// The angle of the forearm below the horizontal.
     pub(crate) drop: SineAndCosine,
-    /// Joint 4.
+    /// The angle of joint 4, the roll of the tool.
     pub(crate) roll: SineAndCosine,
-    /// Joint 5.
+    /// The angle of joint 5, the pitch of the tool.
     pub(crate) pitch: SineAndCosine,
 }
 

@@ -5,7 +5,7 @@ use protocol_core::time::Instant;
 use crate::servo::Servo;
 use crate::servo::units::STEP;
 
-/// The steps of a servo that change nothing, as long as no call changes the servo.
+/// The next steps of a servo that change only its sums and counts, if no call changes the servo.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Rest {

@@ -7,7 +7,7 @@ use crate::scene::Scene;
 use crate::world::{ArmInWorld, Effect, Object, World};
 
 impl Plant {
-    /// Puts a scene on the table round the arm, or removes it. The arm loses what it carries.
+    /// Puts a scene on the table round the arm, or removes it. The arm loses the object of the room that it carries.
     pub fn set_scene(&mut self, scene: Option<Scene>) {
         self.leave_room();
         self.world = scene.map(|scene| Box::new(World::new(scene)));
@@ -19,7 +19,7 @@ impl Plant {
         self.world.as_deref()
     }
 
-    /// The things of the room, in the order of the scene; none without a scene.
+    /// The cubes and cylinders of the room, in the order of the scene. Empty without a scene.
     #[must_use]
     pub fn objects(&self) -> &[Object] {
         self.world().map_or(&[], World::objects)

@@ -70,7 +70,7 @@ impl Display for SupplyFault {
     }
 }
 
-/// The supply.
+/// The voltage source of all servos, with its power switch and its fault.
 #[derive(Clone, Debug, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Supply {
@@ -84,18 +84,18 @@ pub(super) struct Supply {
 }
 
 impl Supply {
-    /// Sets or removes the fault. Its first period begins `now`; the power switch keeps its position.
+    /// Sets or removes the fault, and resets its count. The first period begins at `now`. The power switch keeps its position.
     pub(super) fn set_fault(&mut self, now: Instant, fault: Option<SupplyFault>) {
         let is_switched_off = self.is_switched_off;
         *self = Self { fault, since: now, is_switched_off, ..Self::default() };
     }
 
-    /// Turns the power switch.
+    /// Switches the supply on or off, with or without a fault.
     pub(super) const fn switch(&mut self, is_on: bool) {
         self.is_switched_off = !is_on;
     }
 
-    /// The voltage in 0.1 V, with this sum of all loads in 0.1 %.
+    /// The voltage in 0.1 V. `load` is the sum of the loads of all servos, each in 0.1 % of its full load.
     pub(super) fn decivolts(&self, now: Instant, load: u16) -> u8 {
         let without_load = match self.fault {
             _ if self.is_switched_off => 0,
@@ -143,7 +143,7 @@ impl Supply {
         }
     }
 
-    /// How often the fault took effect: the number of dips for `Dips`, otherwise of frames.
+    /// How often the fault took effect: in dips for [`SupplyFault::Dips`], otherwise in frames.
     pub(super) const fn count(&self) -> FaultCount {
         self.count
     }

@@ -42,7 +42,7 @@ pub(crate) struct Wire {
     queue: VecDeque<FrameOnWire>,
     /// The bytes that the last call of [`Wire::take`] returned.
     arrived: Vec<u8>,
-    /// The memory of an earlier transmission, for the next one.
+    /// The buffer of an earlier transmission, which the next one reuses.
     spare: Vec<u8>,
     /// The end of the last byte to the master.
     free_at: Instant,
@@ -72,7 +72,8 @@ impl Wire {
         self.baud
     }
 
-    /// Reserves the wire for this many bytes of the master, at `now` or after its earlier bytes. Returns start and end.
+    /// Reserves the wire for this many bytes of the master, from `now` or from the end of its earlier bytes on. Returns start and
+    /// end.
     pub(crate) fn reserve(&mut self, now: Instant, count: usize) -> (Instant, Instant) {
         let start = self.master_done_at.max(now);
         self.master_done_at = start + self.byte_time.of(count);
@@ -80,7 +81,7 @@ impl Wire {
     }
 
     /// Returns whether bytes of the master from `begin` to `end` collide with a servo. If they overlap with the servo's bytes,
-    /// those that have not arrived yet are damaged.
+    /// this damages the servo's bytes that have not arrived yet.
     pub(crate) fn collide(&mut self, begin: Instant, end: Instant) -> bool {
         let mut has_collided = begin < self.driven_until;
         let mut free_at = self.free_at;
@@ -103,7 +104,7 @@ impl Wire {
         self.insert(start, bytes.iter().copied(), true);
     }
 
-    /// Lets the master receive its own bytes from `start` on. They are damaged if they collided.
+    /// Lets the master receive its own bytes from `start` on. Damages them if they collided.
     pub(crate) fn echo(&mut self, start: Instant, bytes: &[u8], has_collided: bool) {
         let damage = if has_collided { DAMAGE } else { 0 };
         self.insert(start, bytes.iter().map(|byte| byte ^ damage), false);

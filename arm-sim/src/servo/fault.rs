@@ -33,7 +33,7 @@ pub enum ServoFault {
 )]
 pub struct UnknownFault(String);
 
-/// `late` means 30 ms, and `garbled` every answer.
+/// `late` without a value means 30 ms, and `garbled` without a value every answer.
 impl FromStr for ServoFault {
     type Err = UnknownFault;
 

@@ -61,7 +61,7 @@ impl FaultState {
         is_due
     }
 
-    /// When the servo restarts next.
+    /// When the fault restarts the servo next; [`Instant::FAR_FUTURE`] if it never does.
     pub(super) const fn restarts_at(&self) -> Instant {
         self.restarts_at
     }

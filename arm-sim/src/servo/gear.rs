@@ -21,7 +21,6 @@ pub(super) struct Torques {
 }
 
 impl Torques {
-    /// Their sum.
     pub(super) const fn net(self) -> i64 {
         self.motor + self.outside
     }
@@ -47,8 +46,8 @@ impl Gear {
         torques.outside.abs() + self.0.static_friction + torques.load_friction()
     }
 
-    /// The speed after a step, in millionths of a count per step. `drag` is in micronewton metre seconds per radian,
-    /// `inertia` is that of the arm in gram square millimetres.
+    /// The speed after a step, in millionths of a count per step. `drag` is in micronewton metre seconds per radian. `inertia` is
+    /// the inertia of the arm in gram square millimetres.
     pub(super) fn speed_after(self, speed: i64, torques: Torques, drag: i64, inertia: i64) -> i64 {
         if speed == 0 && self.holds(torques) {
             return 0;
@@ -79,7 +78,7 @@ mod tests {
         Gear(*ServoParameters::of(Joint::ALL[2]))
     }
 
-    /// The speed of joint 3 in degrees per second, after this many milliseconds at this torque from rest.
+    /// The speed that joint 3 reaches from rest in this many milliseconds at this torque, in degrees per second.
     fn degrees_per_second(outside: i64, drag: i64, millis: u32) -> i64 {
         let torques = Torques { motor: 0, outside };
         let speed = (0..millis).fold(0, |speed, _| gear().speed_after(speed, torques, drag, INERTIA));

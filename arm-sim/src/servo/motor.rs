@@ -13,7 +13,7 @@
 //!
 //! Without torque, the weight turns the joint against friction and drag, to the mechanical ends of the servo at 0 and
 //! 1023 counts. All values are integers and all steps are equal, so the motion does not depend on how often the simulation is
-//! polled. There are no frames here.
+//! polled. This module knows no frames.
 
 use motion_core::servo_bus::Reading;
 use protocol_core::registers::Joint;
@@ -129,7 +129,7 @@ impl Motor {
         let distance = (self.target - self.set_point).abs();
         let rate = match (i64::from(goal.speed), i64::from(goal.time_ms)) {
             (0, 0) => self.no_load_distance,
-            // Rounded up: otherwise the move takes a step too many.
+            // Rounded up: otherwise the move takes one step more.
             (0, millis) => (distance + millis - 1) / millis,
             (speed, _) => speed * COUNT_PER_SECOND,
         };
@@ -291,6 +291,7 @@ impl Motor {
     pub(crate) fn stopping_distance(&self) -> i64 {
         let milliradians_per_second = self.moved * 1_000 / self.gear.0.counts_per_kiloradian.max(1);
         // Half the inertia in gram square millimetres, times the square of this speed, is the energy in femtojoules.
+        // `energy` is in picojoules.
         let inertia = self.gear.0.rotor_inertia + self.surroundings.inertia;
         let energy = inertia / 1_000 * milliradians_per_second * milliradians_per_second / 2;
         energy / self.gear.0.stall_torque.max(1) * MILLIDEGREES_PER_RADIAN / 1_000_000
@@ -318,7 +319,7 @@ impl Motor {
         is_stopped || self.gear.holds(torques)
     }
 
-    /// Does it turn, or has it not reached its target?
+    /// Does the motor turn, or has the set-point not reached the target?
     pub(crate) const fn is_moving(&self) -> bool {
         self.moved != 0 || self.set_point != self.target
     }

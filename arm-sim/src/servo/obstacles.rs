@@ -1,4 +1,4 @@
-//! The obstacles of a joint, and alarms that are forced on its servo.
+//! The weight, the contacts and the obstacles of a joint, and alarms that are forced on its servo.
 
 use super::Servo;
 use super::surroundings::{Side, Surface};
@@ -25,7 +25,8 @@ impl Servo {
         self.motor.surroundings.inertia = inertia;
     }
 
-    /// The torque of the arm's weight. The inertia is not needed to end a rest: it has no effect on a joint at rest.
+    /// The torque of the arm's weight. When it changes, the rest of the servo ends. A change of the inertia ends no rest, because
+    /// inertia has no effect on a joint at rest.
     pub(crate) const fn weight(&self) -> i64 {
         self.motor.surroundings.weight
     }
@@ -46,7 +47,8 @@ impl Servo {
         self.wall_count = FaultCount::default();
     }
 
-    /// Sets or removes the thing between the claws. A new thing resets the count; a removed one keeps it.
+    /// Sets or removes the thing between the claws. A new thing resets the count of its milliseconds; a removal keeps the
+    /// count.
     pub(crate) fn set_thing(&mut self, thing: Option<Surface>) {
         self.motor.surroundings.thing = thing;
         if thing.is_some() {
@@ -59,7 +61,8 @@ impl Servo {
         self.motor.surroundings.thing
     }
 
-    /// Sets the torque of a hand in micronewton metres, positive towards more counts. Resets its count.
+    /// Sets the torque of a hand in micronewton metres, positive towards more counts. Resets the count of the milliseconds in
+    /// which the joint was pushed.
     pub(crate) fn push(&mut self, torque: i64) {
         self.motor.surroundings.push = torque;
         self.push_count = FaultCount::default();

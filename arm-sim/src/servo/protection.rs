@@ -82,7 +82,7 @@ impl Protection {
         overload | heat | voltage
     }
 
-    /// Switches the motor off for these error bits. Returns whether torque comes back.
+    /// Switches the motor off if one of these error bits demands it, and on otherwise. Returns whether this ended a switch-off.
     pub(super) const fn unload(&mut self, errors: u8, limits: Limits) -> bool {
         let was_unloaded = self.is_unloaded();
         self.unloading = errors & limits.unloading;

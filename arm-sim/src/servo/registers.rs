@@ -1,7 +1,7 @@
 //! The registers of a simulated servo: executes the instructions of frames and encodes the answers.
 //!
-//! The motor gets its goal from here, and its measurements are written back here. There is no time here: the caller decides
-//! when an answer is sent.
+//! The goal registers control the motor, and the measurements of the motor are written into the registers. This module knows no
+//! time: the caller decides when an answer is sent.
 
 mod memory;
 
@@ -13,7 +13,7 @@ use motion_core::servo_bus::frame::{
 
 use super::protection::Limits;
 
-/// The registers of one servo.
+/// The bytes of registers 0 to 70, which frames read and write.
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct ServoRegisters {
@@ -24,7 +24,7 @@ pub(super) struct ServoRegisters {
     is_torque_written: bool,
 }
 
-/// A goal of a servo.
+/// A goal position with its time and speed: registers 42 to 47.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Goal {
     /// The goal position, 0 to 1023.
@@ -52,7 +52,6 @@ impl ServoRegisters {
         self.is_torque_written = false;
     }
 
-    /// The id of the servo.
     pub(super) fn id(&self) -> u8 {
         let [id] = self.field(register::ID);
         id
@@ -194,19 +193,18 @@ impl ServoRegisters {
         core::mem::take(&mut self.has_new_goal).then(|| self.goal())
     }
 
-    /// The limits of its protections.
+    /// The limits for alarms, in registers 13 to 15 and 19.
     pub(super) fn limits(&self) -> Limits {
         let [max_celsius, max_decivolts, min_decivolts] = self.field(register::MAX_TEMPERATURE);
         let [unloading] = self.field(register::UNLOAD_CONDITIONS);
         Limits { max_celsius, max_decivolts, min_decivolts, unloading }
     }
 
-    /// Sets the measurements.
+    /// Writes the measurements into the registers from the present position (56) on.
     pub(super) fn set_reading(&mut self, reading: &Reading) {
         self.set_field(register::PRESENT_POSITION, reading.to_bytes());
     }
 
-    /// Sets the moving flag.
     pub(super) fn set_moving(&mut self, moving: bool) {
         self.set_field(register::MOVING, [u8::from(moving)]);
     }

@@ -1,4 +1,4 @@
-//! The steps of a servo: supply, alarms, mode of the motor, and what the registers report.
+//! The steps of a servo: supply, alarms, the mode of the motor, and the reported values.
 
 use motion_core::servo_bus::{Reading, Torque};
 use protocol_core::time::Instant;

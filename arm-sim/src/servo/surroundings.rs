@@ -1,4 +1,4 @@
-//! What acts on a joint from outside its servo: the arm's weight and inertia, a hand that pushes, and obstacles.
+//! The influences on a joint from outside its servo: the arm's weight, inertia and contacts, a hand that pushes, and obstacles.
 //!
 //! Positions are in millionths of a count. Torques are in micronewton metres, positive towards more counts. There are no
 //! angles here.
@@ -60,7 +60,7 @@ impl Surface {
     }
 }
 
-/// What acts on a joint from outside.
+/// The influences on a joint from outside its servo. Torques are in micronewton metres, positive towards more counts.
 #[derive(Clone, Debug, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Surroundings {

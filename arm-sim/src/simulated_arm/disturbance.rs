@@ -1,4 +1,4 @@
-//! Faults of a running arm, each until it is removed or its time is over, and a drop of what the gripper holds.
+//! Faults of a running arm, each until it is removed or its time is over, the timing of its host line, and drops.
 
 use alloc::vec::Vec;
 
@@ -38,7 +38,7 @@ impl<F: NorFlash, C: ArmController> SimulatedArm<F, Plant, C> {
     }
 
     /// Gives each byte on the host line its own deadline. Then results do not depend on whether the host sends two frames at
-    /// once, or the second one as soon as the first one has arrived. [`SimulatedArm::set_seed`] ends it.
+    /// once, or the second one as soon as the first one has arrived. [`SimulatedArm::set_seed`] resets this.
     pub const fn set_bytewise_line(&mut self) {
         self.to_arm.set_bytewise();
         self.to_host.set_bytewise();
@@ -79,7 +79,7 @@ impl<F: NorFlash, C: ArmController> SimulatedArm<F, Plant, C> {
         ended
     }
 
-    /// Drops what is in the gripper at `now`. Returns the report of the thing between the claws.
+    /// Drops everything that the tool holds at `now`. Returns the report of the thing between the claws, if there was one.
     pub(super) fn drop_thing(&mut self, now: Instant) -> Vec<FaultReport> {
         self.record_action(now, Action::Drop);
         self.simulate(now, false);
@@ -109,7 +109,7 @@ impl<F: NorFlash, C: ArmController> SimulatedArm<F, Plant, C> {
 }
 
 impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
-    /// Ends the faults whose time is over, and a thing between the claws that was dropped.
+    /// Ends the faults whose time is over, and the fault of a thing that the claws have dropped. Keeps their reports.
     pub(super) fn end_due_faults(&mut self) {
         if self.faults.has_thing() && self.bus.plant_mut().is_some_and(|plant| !plant.has_thing()) {
             // The claws opened and dropped the thing.

@@ -11,8 +11,8 @@ use crate::plant::Plant;
 use crate::servo_bus::ServoBus;
 
 impl<F: NorFlash, C: ArmController> SimulatedArm<F, Plant, C> {
-    /// Switches the arm off at `now`, until [`SimulatedArm::power_cycle`]. RAM, the bytes on the host line and what the
-    /// host sends are lost. Loaded joints fall.
+    /// Switches the arm off at `now`, until [`SimulatedArm::power_cycle`]. RAM and the bytes on the host line are lost, and so
+    /// are the bytes that the host sends meanwhile. Loaded joints fall.
     pub fn power_off(&mut self, now: Instant) {
         self.record_action(now, Action::PowerOff);
         self.halt(now);

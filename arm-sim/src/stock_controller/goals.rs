@@ -53,7 +53,7 @@ impl LastGoals {
         }
     }
 
-    /// Takes new targets. Returns the goals of those that differ from the last ones.
+    /// Takes new targets. Returns goals for the joints whose target differs from the last one.
     pub(super) fn change(
         &mut self,
         targets: [Option<u8>; JOINTS],

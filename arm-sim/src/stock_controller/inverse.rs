@@ -73,7 +73,7 @@ impl Solver {
     }
 }
 
-/// Whole degrees, truncated. `None`: the solver has no angle for this joint, which keeps its target.
+/// Truncates angles to whole degrees. `None`: the solver has no angle for this joint, so the joint keeps its target.
 fn targets(angles: &[f32]) -> [Option<u8>; JOINTS] {
     let mut targets = [None; JOINTS];
     for (target, &angle) in targets.iter_mut().zip(angles) {

@@ -108,7 +108,7 @@ impl StockRegisters {
         self.offsets.get(usize::from(joint.index())).copied().unwrap_or(0)
     }
 
-    /// The values of `N` registers.
+    /// The values of `N` registers from `first` on.
     pub(super) fn bytes<const N: usize>(&self, first: u8) -> [u8; N] {
         let mut bytes = [0; N];
         for (byte, address) in bytes.iter_mut().zip(first..=u8::MAX) {
@@ -135,8 +135,8 @@ fn offset(stored: u8) -> i8 {
     }
 }
 
-/// A load in 0.1 %, as the maker's firmware shows it: 128 + load / 8. The firmware subtracts a servo's word with the sign bit
-/// from 1023, so a negative load gets 0.1 % more negative.
+/// Converts a load in 0.1 % to the value of the maker's firmware: 128 + load / 8. The firmware subtracts a servo's word with the
+/// sign bit from 1023, so a negative load becomes 0.1 % more negative.
 fn load(tenths: i16) -> u8 {
     let tenths = if tenths < 0 { tenths.saturating_sub(1) } else { tenths };
     u8::try_from(128 + tenths / 8).unwrap_or(if tenths < 0 { 0 } else { u8::MAX })

@@ -1,12 +1,12 @@
-//! The points of the arm that can touch something, and the torques on the joints by a force on one of them.
+//! The points of the arm that can touch something, and the torques on the joints that a force at such a point causes.
 //!
 //! ```text
 //!                       finger ──┐
-//!   elbow ── wrist ── disc ──────┤ pads: they grip from 12 mm before their ends
+//!   elbow ── wrist ── disc ──────┤ pads: the last 12 mm of each finger
 //!                       finger ──┘
 //! ```
 //!
-//! The fingers are those of the drawn model of the arm. Each turns by half of the angle of joint 7.
+//! The fingers have the dimensions of the drawn model of the arm. Each finger turns by half of the angle of joint 7.
 
 use kinematics::geometry::{CLAW_MAX, DISC_RADIUS, FINGER_AXIS, FINGER_BEND, FINGER_END};
 use kinematics::{Float, Frames, Vector, forward};
@@ -97,8 +97,8 @@ impl Hand {
         parts.into_iter().chain(edge).chain(tool)
     }
 
-    /// The torques on joints 1 to 6 by a force in N at a point that the first `joints` joints move. In mN m, positive towards
-    /// greater angles.
+    /// The torques on joints 1 to 6 that a force in N at `point` causes, in mN m, positive towards greater angles. The first
+    /// `joints` joints move the point.
     pub(super) fn torques(&self, point: Point, joints: usize, force: Point) -> [f64; 6] {
         let Frames { arm, hand } = &self.frames;
         let about = |axis: Point, centre: Point| axis.cross(point - centre).dot(force);

@@ -6,12 +6,13 @@
 //!                             └──▶ an object between the claws or at the cup is carried, and dropped
 //! ```
 //!
-//! This is not a simulation of rigid bodies. It has only what an arm that sorts and stacks needs, in steps of a millisecond:
-//! - A part of the arm, or what it carries, that touches something is pushed back by 8 N for each mm, at right angles to
-//!   the surface. So the table is an obstacle like any other. There is no friction and no bounce.
-//! - An object that is pushed from the side moves out of the way, with what stands on it, unless a wall stops it. It never
-//!   tips over, and does not turn.
-//! - An object falls until its middle is above something, and stands there upright. An object that is let go turns upright.
+//! This is not a simulation of rigid bodies. It simulates only contacts that matter for sorting and stacking, in steps of a
+//! millisecond:
+//! - Where a part of the arm or a carried object touches something, it is pushed back at right angles to the surface, by 8 N for
+//!   each mm of depth. The table is an obstacle like any other. There is no friction and no bounce.
+//! - An object that is pushed from the side moves out of the way, with the objects that stand on it, unless a wall or a row of
+//!   objects stops it. It never tips over, and does not turn.
+//! - An object falls to the highest surface below its middle, and stands there upright. An object that is let go turns upright.
 //! - The claws carry an object once they touch it on both sides, however hard they press, until they open. The cup carries
 //!   an object that it touches with the pump on.
 //!
@@ -134,7 +135,7 @@ impl World {
         world
     }
 
-    /// Puts an object on what is below it.
+    /// Puts an object on the highest surface at its place: the table, a wall or an earlier object.
     fn place(&mut self, item: Item) {
         let solid = Solid::from(item.form);
         let [x, y] = item.at;
@@ -272,7 +273,7 @@ impl World {
         hand.balls(self.scene.tool).chain(corners).collect()
     }
 
-    /// Is this ball the end of a finger whose pad touches the object instead? Then the ball does not touch it.
+    /// Is this ball the end of a finger, and the object between the claws? Then the pads touch the object, and the ball does not.
     fn is_left_to_pads(&self, index: usize, ball: &Ball) -> bool {
         ball.is_finger_end && self.between == Some(index)
     }

@@ -1,4 +1,4 @@
-//! Objects that move by themselves or are pushed: they fall, and slide on what they stand on.
+//! Objects that fall, and objects that are pushed along the surface on which they stand.
 
 use alloc::vec::Vec;
 
@@ -36,7 +36,7 @@ impl World {
         }
     }
 
-    /// The height of the highest top below `middle`, the middle of the object `index`: of the table, a wall or another object.
+    /// The height of the highest surface below `middle`: the table, or the top of a wall or of an object other than `index`.
     pub(super) fn support(&self, index: Option<usize>, middle: Point) -> f64 {
         let walls = self.walls.iter().filter_map(|(frame, solid)| {
             let at = Vector::new(middle.x, middle.y, frame.origin.z);
@@ -64,7 +64,8 @@ impl World {
         }
     }
 
-    /// Moves an object along the table, and those in its way. Returns whether it moved: a wall or a longer row stops it.
+    /// Moves an object, and the objects in its way, horizontally. `row` is the number of pushed objects before it. Returns
+    /// `false` if a wall or a row of more than [`LONGEST_ROW`] objects stops it.
     pub(super) fn shove(&mut self, index: usize, by: Point, row: u32) -> bool {
         let Some(object) = self.objects.get(index) else { return false };
         let (radius, bottom, top) = (object.solid.inner_radius(), object.bottom(), object.top());

@@ -1,4 +1,4 @@
-//! The forms of objects and walls, and where they touch a point.
+//! The forms of objects and walls, and their contacts with balls.
 
 use kinematics::{Float, Vector};
 
@@ -85,7 +85,7 @@ impl Solid {
         (distance < ball).then_some(Touch { depth: ball - distance, normal })
     }
 
-    /// The corners, for contacts with other solids. A cylinder has those of the box that it contains.
+    /// The corners, for contacts with other solids. For a cylinder: the corners of the largest box with a square base inside it.
     pub(super) fn corners(self, frame: &Frame) -> [Point; 8] {
         let [x, y, z] = match self {
             Self::Box(half) => half,

@@ -16,7 +16,7 @@ use protocol_core::wire::FrameBuffer;
 
 const READ_POSITIONS: Request<'_> =
     Request::Read { address: PRESENT_POSITION.address, count: PRESENT_POSITION.count };
-/// Answer to a read of seven registers.
+/// Bytes of the answer to a read of seven registers.
 const ANSWER_LENGTH: usize = 14;
 
 fn simulation<C: Cells>(is_paced: bool, flash: Flash<C>) -> SimulatedArm<Flash<C>> {

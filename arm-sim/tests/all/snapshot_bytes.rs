@@ -1,4 +1,4 @@
-//! A saved and loaded arm behaves exactly as the original does, in any state.
+//! A saved and loaded arm behaves exactly as the original does: after random actions, and with an object in its claws.
 
 use arm_sim::request::Request;
 use arm_sim::{Action, Duration, Simulation};
@@ -54,7 +54,7 @@ const ACTIONS: [&str; 34] = [
     "scene table 190; cube red 40 100 40 260; cylinder can 40 60 200 -40 250; wall shelf 0 280 200 40 50",
 ];
 
-/// The host sends a point of a stream, and one other request.
+/// The host sends a point of a stream. Then it sends a read, or now and then another request or a part of one, or disconnects.
 fn send_point(arm: &mut Simulation, number: u16) {
     let wave = 200 * (number % 20).abs_diff(10);
     let point: Vec<u8> = REST.iter().flat_map(|angle| (angle + wave).to_le_bytes()).collect();

@@ -1,4 +1,4 @@
-//! An arm as the maker delivers it, as a host sees it.
+//! The bytes that an arm with the maker's controller exchanges with its host.
 
 use arm_sim::flash::Flash;
 use arm_sim::plant::Plant;

@@ -239,7 +239,7 @@ fn joint_of(number: u8) -> Result<Joint, ControlRefusal> {
     Joint::new(number).ok_or_else(|| ControlRefusal::new("no such joint", "joints are 1 to 7"))
 }
 
-/// Converts an angle of a joint to the position of its servo in counts.
+/// Converts an angle of a joint from degrees to the position of its servo in counts.
 fn counts(joint: Joint, degrees: f64) -> Result<u16, ControlRefusal> {
     if !(0.0..=180.0).contains(&degrees) {
         return Err(ControlRefusal::new(

@@ -1,8 +1,8 @@
-//! The control socket of an arm: faults, a hand, a weight, power and state, while the simulator runs.
+//! The control socket of an arm: faults, a hand, things, power, virtual time, snapshots and state, while the simulator runs.
 //!
 //! ```text
 //!   client ──▶ {"do":"fault","fault":"3=missing","for_ms":2000}
-//!          ◀── {"ok":{"fault":"3=missing"}}
+//!          ◀── {"ok":{"fault":"3=missing","replaced":[]}}
 //!   client ──▶ {"do":"state"}
 //!          ◀── {"ok":{"time_us":8250000,"joints":[...],"faults":[...],...}}
 //!   client ──▶ {"do":"stat"}

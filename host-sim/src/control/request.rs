@@ -38,7 +38,7 @@ pub enum ControlRequest {
         /// The weight; 0 removes it.
         grams: u16,
     },
-    /// Drops what is in the gripper: the thing between the claws, and the weight.
+    /// Drops everything that the tool holds: the thing between the claws, the weight, and an object of the scene.
     Drop,
     /// Puts a scene on the table round the arm, or removes it.
     Scene {
@@ -55,7 +55,7 @@ pub enum ControlRequest {
     },
     /// Switches the power.
     Power {
-        /// The state of the power.
+        /// What the power switch does.
         to: Power,
     },
     /// Restarts the controller. The servos keep their power.
@@ -66,7 +66,7 @@ pub enum ControlRequest {
     Pause,
     /// Lets virtual time go on after a pause.
     Resume,
-    /// Lets this virtual time pass as fast as possible. The answer comes at the end of it.
+    /// Lets this virtual time pass as fast as possible. The answer comes at the end of this time.
     Advance {
         /// The time in milliseconds.
         ms: u64,
@@ -129,7 +129,7 @@ pub enum MaxSpeed {
     Max,
 }
 
-/// Does a hand hold a joint?
+/// Whether a hand holds a joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Grip {
@@ -168,7 +168,7 @@ impl ControlRefusal {
     }
 }
 
-/// Parses a line.
+/// Parses a line of a control socket.
 ///
 /// # Errors
 /// The line is not a request.

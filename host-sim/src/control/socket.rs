@@ -19,7 +19,7 @@ use crate::private_socket::{PrivateSocket, SocketError, is_temporary};
 
 /// The longest line, in bytes.
 const LONGEST_LINE: usize = 4_096;
-/// No request of a client is executed while this many bytes of answers wait for it.
+/// No request of a client is executed while this many bytes of answers wait for the client.
 const LONGEST_BACKLOG: usize = 64 * 1_024;
 /// The most clients at the same time.
 const CLIENTS: usize = 16;

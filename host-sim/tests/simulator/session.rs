@@ -13,7 +13,8 @@ use protocol_core::registers::map::{
 };
 use rustix::process::Signal;
 
-/// A client moves an arm with a bad servo, stores a setting, and asks while reports come. The power fails once.
+/// Records a session: a client moves an arm with a bad servo, stores a setting, and reads while reports come. Then come a power
+/// cycle, a restart of the controller, and a second client.
 fn record(file: &Path, arguments: &[&str]) {
     let common = ["--record", file.to_str().unwrap(), "--fault", "3=garbled=4", "--seed", "5"];
     let mut sim = Sim::start(&[&common, arguments].concat());

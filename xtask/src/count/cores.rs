@@ -1,4 +1,4 @@
-//! Programs of `footprint` that count the instructions of the cores and their peers, and print the counts.
+//! Runs programs of `footprint` in the emulator. They count the instructions of the cores and their peers, and print the counts.
 
 use std::io::{BufRead, BufReader};
 use std::process::Stdio;

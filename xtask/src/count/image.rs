@@ -1,4 +1,4 @@
-//! Counts instructions of the image for the arm, from one event on its lines to another.
+//! Counts instructions of the image for the arm: for requests, passes of its loop, interrupts and idle time.
 
 use std::collections::HashMap;
 use std::iter::repeat_n;
@@ -40,7 +40,7 @@ const PATTERN_MILLIS: usize = 500;
 const LOG_LINES: usize = 3;
 /// The number of requests after a false header. A header claims up to 262 bytes.
 const DELAYED_READS: usize = 34;
-/// The number of measurements of their delay.
+/// The number of measurements of the delay of these requests.
 const DELAY_TRIES: usize = 9;
 /// The time after which the arm has dropped a false header (D4).
 const DROP_TIME: Duration = Duration::from_millis(300);
@@ -79,11 +79,11 @@ struct Silence {
 
 /// Instructions of iterations of the loop.
 struct Passes {
-    /// One that moves seven joints.
+    /// An iteration that moves seven joints.
     cycle: u64,
     /// The part of `cycle` from the wake-up to the first byte of the goals.
     first_goal_byte: u64,
-    /// One with nothing to do.
+    /// An iteration with nothing to do.
     idle: u64,
 }
 
@@ -150,8 +150,8 @@ fn watch_for(image: &mut LoggedImage, time: Duration) -> TaskResult<Vec<TraceEve
     })
 }
 
-/// The delay of requests behind a false header, in microseconds: from the last of them to the first reply. It is the gap of
-/// 2 ms (D4), up to a tick until the loop takes the bytes, and up to a tick by which the measurement begins too early.
+/// The delay of requests behind a false header, in microseconds: from the last request to the first reply. It consists of the gap
+/// of 2 ms (D4), up to a tick until the loop takes the bytes, and up to a tick by which the measurement begins too early.
 /// Returns the largest of several measurements.
 fn behind_a_false_header() -> TaskResult<u64> {
     let mut image = LoggedImage::alone()?;
@@ -169,8 +169,8 @@ fn behind_a_false_header() -> TaskResult<u64> {
     Ok(delays.into_iter().max().ok_or("nothing was held up by a false header")?)
 }
 
-/// Microseconds between two readings of the time: the last one before the last byte of the host, and the last one before the
-/// first reply.
+/// Microseconds between two readings of the time: the last reading before the last byte of the host, and the last reading before
+/// the first reply.
 fn first_reply_after_micros(events: &[TraceEvent]) -> Option<u64> {
     let reply = events.iter().position(|event| *event == TraceEvent::Wrote(HOST_DATA))?;
     let (waiting, _) = events.split_at_checked(reply)?;
@@ -204,9 +204,9 @@ impl ImageAddresses {
         self.sleeps.iter().any(|&at| trace::is_step_at(event, at))
     }
 
-    /// Instructions in ten milliseconds of the idle arm: one control cycle, ten polls of its lines, and reads of missing
-    /// servos. The median, because a log may or may not contain the log lines of each second. For the longest masked
-    /// stretch, the logs must contain all these lines.
+    /// The figures of the idle arm. `ten_millis` covers one control cycle, ten polls of its lines, and reads of missing servos.
+    /// It is a median, because a log may or may not contain the log lines of each second. For `masked`, the logs must contain
+    /// all these lines.
     fn silence(&self) -> TaskResult<Silence> {
         let mut image = LoggedImage::alone()?;
         // The pattern repeats in virtual time, which runs fast.
@@ -230,9 +230,9 @@ impl ImageAddresses {
         Err("the log shows too few milliseconds of silence, or too few log lines".into())
     }
 
-    /// Instructions from the interrupt of one byte of a request until `end`. `from_last` is 1 for the last byte. Only logs
-    /// count in which the arm sleeps when the byte arrives and no other event follows. A pause before the byte makes the
-    /// deframer search behind the incomplete frame.
+    /// The median number of instructions from the interrupt of one byte of a request until `end`. `from_last` is 1 for the last
+    /// byte. A log counts only if the arm sleeps when the byte arrives and no other event follows. A pause before the byte makes
+    /// the deframer search behind the incomplete frame.
     fn paths(
         &self,
         image: &mut LoggedImage,
@@ -251,7 +251,7 @@ impl ImageAddresses {
         median(paths, "a request that nothing disturbs")
     }
 
-    /// `None` if the arm was awake or another event came in between.
+    /// The instructions in one log. `None` if the arm was awake or another event came in between.
     fn path(&self, events: &[TraceEvent], end: impl Fn(&TraceEvent) -> bool) -> Option<u64> {
         let byte = events.iter().position(|event| *event == TraceEvent::Read(HOST_DATA))?;
         let is_entry = |event: &TraceEvent| trace::is_step_at(event, self.host_interrupt);
@@ -266,7 +266,8 @@ impl ImageAddresses {
     }
 
     /// True if the loop sleeps after these events, and no event has come that would wake it. The poll before the sleep
-    /// disables interrupts, so the last events may be instructions that enable them again. Without events, it slept.
+    /// disables interrupts, so the last events may be instructions that enable them again. Without events, the loop
+    /// was asleep.
     fn is_asleep_after(&self, events: &[TraceEvent]) -> bool {
         let last = events.iter().rev().find_map(|event| match event {
             TraceEvent::Step { at, in_handler } => Some((*at, *in_handler)),
@@ -276,7 +277,7 @@ impl ImageAddresses {
         last.is_none_or(|(at, in_handler)| !in_handler && is_sleep(at))
     }
 
-    /// Iterations of the loop from a wake-up to the sleep, without received bytes.
+    /// The medians over the iterations of the loop, each from one sleep to the next, in which no byte of a servo was received.
     fn passes(&self, events: &[TraceEvent]) -> TaskResult<Passes> {
         let (mut cycles, mut first_bytes, mut others) = (Vec::new(), Vec::new(), Vec::new());
         for pass in trace::between(events, |event| self.is_sleep(event)) {

@@ -1,5 +1,5 @@
 //! The load of the chip while a program streams points and gets reports: the instructions of a second.
-//! A part of it is counted.
+//! Only a part of this second is counted, and then scaled.
 //!
 //! ```text
 //!   200 frames a second of seven fine targets ──▶ image ──▶ 50 reports a second of content 2
@@ -40,7 +40,7 @@ const STEP: u16 = 30;
 /// transmitter is always empty, so that one interrupt sends up to eight bytes.
 const PER_BYTE_SENT: u64 = 59 + 38;
 
-/// On a busy computer the image may miss ticks, and then it does less.
+/// The most attempts. On a busy computer the image may miss ticks, and then it sends fewer reports than it should.
 const ATTEMPTS: usize = 4;
 
 /// The load as one figure. The part of the sent bytes is computed, the rest is counted.

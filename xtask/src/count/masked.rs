@@ -1,4 +1,4 @@
-//! How long interrupts are masked. While they are, no interrupt can take a byte from a line. At 1 Mbaud a byte lasts 1,680
+//! How long interrupts are masked. Meanwhile no interrupt can take a byte from a line. At 1 Mbaud a byte lasts 1,680
 //! cycles of the core.
 
 use std::collections::HashMap;
@@ -6,7 +6,7 @@ use std::collections::HashMap;
 use emulator::trace::TraceEvent;
 use linked_image::Effect;
 
-/// The most instructions between the one that masks interrupts and the one that unmasks them. Sleep ends a stretch, because an
+/// The most instructions between masking interrupts and unmasking them. Sleep ends a stretch, because an
 /// interrupt ends sleep.
 pub(super) fn longest_stretch(events: &[TraceEvent], effects: &HashMap<u64, Effect>) -> u64 {
     let (mut longest, mut stretch) = (0, None);

@@ -1,7 +1,7 @@
 //! `cargo xtask count`: counts instructions on the emulated chip.
 //!
-//! Instructions are not cycles: flash wait states, branches and divisions take time on the chip. But the counts are exact and
-//! reproducible, so they show every increase.
+//! Instructions are not cycles: flash wait states, branches and divisions take time on the chip. But most counts are the
+//! same in every run, so they show every increase.
 
 mod cores;
 mod direction;
@@ -44,7 +44,7 @@ const EXPECTED: &[(&str, u64)] = &[
     ("kinematics give the bits of the host", 1),
 ];
 
-/// The counts of a program that did its work.
+/// Runs a program and returns its counts. Fails if the program did not do its work.
 pub(crate) fn of(program: &ChipProgram) -> TaskResult<Vec<NamedCount>> {
     checked(program, cores::figures(program)?)
 }

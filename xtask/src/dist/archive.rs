@@ -44,7 +44,7 @@ fn sorted(files: &[PackedFile]) -> Vec<&PackedFile> {
     sorted
 }
 
-/// A `.tar.gz` whose files are of this time, in seconds since 1970.
+/// A `.tar.gz` whose files have the time `epoch`, in seconds since 1970.
 pub(super) fn tar_gz(files: &[PackedFile], epoch: u64) -> TaskResult<Vec<u8>> {
     let mut archive = tar::Builder::new(Vec::new());
     for file in sorted(files) {
@@ -58,14 +58,14 @@ pub(super) fn tar_gz(files: &[PackedFile], epoch: u64) -> TaskResult<Vec<u8>> {
     gzip(&archive.into_inner()?, Compression::default())
 }
 
-/// Compressed, without a name and a time.
+/// The bytes compressed by gzip, without a name and a time.
 pub(super) fn gzip(bytes: &[u8], level: Compression) -> TaskResult<Vec<u8>> {
     let mut encoder = GzBuilder::new().write(Vec::new(), level);
     encoder.write_all(bytes)?;
     Ok(encoder.finish()?)
 }
 
-/// A `.zip`. The format has no time zone and begins in 1980: all files are of its first day.
+/// A `.zip`. The format has no time zone and begins in 1980. All files have its first day as their time.
 pub(super) fn zip(files: &[PackedFile]) -> TaskResult<Vec<u8>> {
     let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
     for file in sorted(files) {

@@ -1,4 +1,4 @@
-//! Checks a finished folder: the files that a release has, unchanged, each of the version that the folder says.
+//! Checks a finished folder: its files are listed and unchanged, and programs and packages have the version that its note names.
 
 use std::fs;
 use std::io::{Cursor, Read};

@@ -21,7 +21,7 @@ const LIBRARIES: [&str; 11] = [
     "sevenbot-serve",
 ];
 
-/// A line of the workspace's manifest. With it, cargo gives packages no versions of one another.
+/// A line of the workspace's manifest. With this line, cargo does not find the packed libraries as dependencies of one another.
 const NOT_PUBLISHED: &str = "\npublish = false\n";
 const PUBLISHED: &str = "\npublish = true\n";
 

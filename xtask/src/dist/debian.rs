@@ -1,4 +1,4 @@
-//! The package for Debian and Ubuntu: an installation below /usr, and what `dpkg` has to know of it.
+//! The package for Debian and Ubuntu: an installation below /usr, and the control files for `dpkg`.
 
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
@@ -15,7 +15,7 @@ use crate::run::{TaskResult, empty_folder, run_command};
 
 /// The maintainer of the package, unless the variables of Debian's tools name another one.
 const MAINTAINER: &str = "7Bot V2 firmware developers <sevenbot@example.org>";
-/// The text of the MIT licence is in the package; that of Apache is in each Debian system.
+/// The package contains the text of the MIT licence. Each Debian system contains the text of the Apache licence.
 const COPYRIGHT: &str = "\
 Format: https://www.debian.org/doc/packaging-manuals/copyright-format/1.0/
 Upstream-Name: sevenbot
@@ -38,7 +38,7 @@ pub(super) fn name(release: &Release, debian: &str) -> String {
     format!("sevenbot_{}_{debian}.deb", release.version)
 }
 
-/// Writes the package with these files of an installation.
+/// Writes the package with these files of an installation. Does nothing for a system that is not Linux.
 pub(super) fn write(release: &Release, platform: Platform, files: &[PackedFile]) -> TaskResult {
     let Some(debian) = platform.debian else { return Ok(()) };
     let folder = build_directory().join("debian").join(debian);

@@ -19,7 +19,7 @@ use super::platform::{build_directory, reproducible};
 use super::release::Release;
 use crate::run::{CHIP, TaskResult, root, run_command};
 
-/// Bytes of flash that are erased have this value.
+/// The value of an erased byte of flash.
 const ERASED: u8 = 0xFF;
 /// Bytes in a line of a `.hex` file.
 const HEX_LINE: usize = 16;
@@ -39,7 +39,7 @@ pub(super) fn dfu_name(release: &Release) -> String {
 /// Builds the image and the self-test image, and writes the files.
 pub(super) fn write(release: &Release) -> TaskResult {
     let map = build_directory().join("firmware.map");
-    // cargo hashes the arguments of the linker into the names of symbols, so this path is the same in each clone.
+    // cargo hashes the arguments of the linker into the names of symbols. So use a path that is the same in each clone.
     let map = map.strip_prefix(root()).unwrap_or(&map);
     build(release, "self-test", "")?;
     build(release, "firmware-stm32", &format!("-Clink-arg=-Map={}", map.display()))?;

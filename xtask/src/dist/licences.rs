@@ -13,7 +13,7 @@ use crate::workspace::{Metadata, Package, metadata};
 const RELEASED: [&str; 5] = ["firmware-stm32", "host-sim", "sevenbot-cli", "sevenbot-python", "sevenbot-web"];
 /// How the names of files with a licence begin.
 const LICENCE_FILES: [&str; 6] = ["copying", "copyright", "licence", "license", "notice", "unlicense"];
-/// Between two parts of the text.
+/// The line between two parts of the text.
 const RULE: &str = "\n================================================================================\n";
 
 /// The list of all crates, and each text once.

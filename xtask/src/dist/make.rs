@@ -16,9 +16,9 @@ use super::{check, debian, firmware, licences, page, sbom, sums, tools, wheels};
 use crate::run::{TaskResult, empty_folder, target_directory};
 use crate::times::Times;
 
-/// Makes everything.
+/// Makes a release in `folder`, and checks it.
 pub(super) fn make(folder: PathBuf) -> TaskResult {
-    // Archives that other tools make keep the permissions of files, which depend on this.
+    // Archives that other tools make keep the permissions of files, which depend on the umask.
     umask(Mode::from_raw_mode(0o022));
     let release = Release::of_this_commit(folder)?;
     empty_folder(&release.folder)?;
@@ -55,7 +55,7 @@ pub(super) fn make(folder: PathBuf) -> TaskResult {
 }
 
 /// Packs the programs that the tests have built for this computer: the archive and the package, in a folder of their own.
-/// The step of the Python package installs the wheel. Returns the folder.
+/// Makes no wheel, because the step of the Python package already installs one. Checks the folder, and returns it.
 pub(super) fn make_native() -> TaskResult<PathBuf> {
     let folder = target_directory().join("dist-native");
     let release = Release { commit: None, ..Release::of_this_commit(folder)? };
@@ -68,7 +68,7 @@ pub(super) fn make_native() -> TaskResult<PathBuf> {
     Ok(release.folder)
 }
 
-/// The archive and the package of a system.
+/// Writes the archive and the package of a system.
 fn pack(release: &Release, platform: Platform, built: &Path, common: &CommonFiles) -> TaskResult {
     let files = tree::files(platform, built, common)?;
     let folder = release.name("sevenbot", &format!("-{}", platform.name));

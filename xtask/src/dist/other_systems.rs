@@ -10,8 +10,8 @@ const SYSTEMS: [&str; 2] = [WINDOWS.triple, "aarch64-apple-darwin"];
 /// All other crates that run there are dependencies of these.
 const PACKAGES: [&str; 3] = ["sevenbot-cli", "sevenbot-python", "sevenbot-serve"];
 
-/// Lints the packages. Nothing is linked, so the C code among their dependencies is not compiled: `true` stands for the compiler
-/// and for the archiver.
+/// Lints the packages. Nothing is linked, so the C code of their dependencies is not needed: the program `true` replaces the C
+/// compiler and the archiver.
 pub(crate) fn lint_other_systems() -> TaskResult {
     // A folder of its own: another build runs at the same time, and would wait for the lock of a common folder.
     let folder = target_directory().join("other-systems");

@@ -23,15 +23,15 @@ const POLICY: &str = "default-src 'self'; script-src 'self' 'wasm-unsafe-eval'; 
 /// The policy of the page in one file. A page from a disk may not load other files, so this page contains everything.
 const OWN_POLICY: &str = "default-src 'none'; script-src 'unsafe-inline' 'wasm-unsafe-eval'; \
                           style-src 'unsafe-inline'; img-src data:;";
-/// The editor of block programs: the page loads it, or finds it as this element.
+/// The element that holds the editor of block programs in the page in one file. The page in a folder loads the editor instead.
 const EDITOR: [&str; 2] = ["<script type=\"text/plain\" id=\"programs\">", "</script>"];
 
-/// The page as a folder, packed.
+/// The name of the page as a packed folder.
 pub(super) fn folder_name(release: &Release) -> String {
     release.name("sevenbot-page", ".zip")
 }
 
-/// The page as one file.
+/// The name of the page as one file.
 pub(super) fn file_name(release: &Release) -> String {
     release.name("sevenbot-page", ".html")
 }
@@ -55,7 +55,7 @@ pub(super) fn write(release: &Release) -> TaskResult {
     Ok(fs::write(release.path(&file_name(release)), in_one_file()?)?)
 }
 
-/// The page with everything that it loads in it.
+/// The page as one file, which contains all files that the page loads.
 fn in_one_file() -> TaskResult<String> {
     let read = |name: &str| fs::read_to_string(root().join("web/page").join(name));
     let mut page = read("index.html")?;
@@ -71,7 +71,7 @@ fn in_one_file() -> TaskResult<String> {
     Ok(page)
 }
 
-/// The editor of block programs as text, which the page makes a script when it needs it.
+/// The editor of block programs as text. The page turns the text into a script when the editor is needed.
 fn editor() -> TaskResult<String> {
     let [begin, end] = EDITOR;
     let code = fs::read_to_string(root().join("web/dist").join(web::EDITOR))?;

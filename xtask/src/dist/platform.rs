@@ -45,7 +45,7 @@ pub(super) const WINDOWS: Platform =
 pub(super) const PLATFORMS: [Platform; 3] = [LINUX_X86_64, LINUX_AARCH64, WINDOWS];
 
 impl Platform {
-    /// The programs: `host-sim` needs pseudo-terminals.
+    /// The programs for this system. `host-sim` needs pseudo-terminals, so it is for Linux only.
     pub(super) fn programs(self) -> &'static [&'static str] {
         if self.debian.is_some() { &["host-sim", "sevenbot"] } else { &["sevenbot.exe"] }
     }
@@ -98,7 +98,7 @@ pub(super) fn build_directory() -> PathBuf {
     target_directory().join(PROFILE)
 }
 
-/// Sets what makes the bytes of a build depend on the commit only.
+/// Sets the flags and variables that make the bytes of a build depend on the commit only.
 pub(super) fn reproducible(command: &mut Command, release: &Release, triple: &str) -> TaskResult {
     let name = triple.to_uppercase().replace('-', "_");
     let mut all = remapped_paths()?.join(" ");

@@ -5,7 +5,7 @@ use std::process::{Command, Stdio};
 
 use crate::run::{TaskResult, root};
 
-/// Hexadecimal digits of a commit in names and versions.
+/// The number of hexadecimal digits of a commit in versions, as an option of git.
 const COMMIT_DIGITS: &str = "--abbrev=12";
 
 /// A release.
@@ -13,7 +13,7 @@ const COMMIT_DIGITS: &str = "--abbrev=12";
 pub(super) struct Release {
     /// The version of the workspace: `3.0.0`.
     pub(super) version: String,
-    /// The commit, with `-dirty` if files differ from it; `None`: programs that do not know it.
+    /// The commit, with `-dirty` if files differ from it; `None`: the programs were built without it.
     pub(super) commit: Option<String>,
     /// The time of the commit in seconds since 1970. All files in archives have it.
     pub(super) epoch: u64,

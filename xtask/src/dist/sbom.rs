@@ -1,4 +1,4 @@
-//! The parts of the programs as CycloneDX, made by cargo-cyclonedx.
+//! The parts of the programs, the module, the page and the image as lists in the format CycloneDX, made by cargo-cyclonedx.
 
 use std::fs;
 use std::process::Command;
@@ -8,7 +8,7 @@ use super::release::Release;
 use super::{sources, tools};
 use crate::run::{TaskResult, run_command};
 
-/// The packages that have a list: their folder, and the name of the list.
+/// The packages that have a list: their folder, their name, and the name of the list.
 const LISTED: [(&str, &str, &str); 5] = [
     ("sevenbot-cli", "sevenbot-cli", "sevenbot"),
     ("host-sim", "host-sim", "host-sim"),

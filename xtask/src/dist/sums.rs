@@ -12,7 +12,7 @@ use crate::run::TaskResult;
 /// The name of the file.
 pub(super) const NAME: &str = "SHA256SUMS";
 
-/// Writes the file for all others of the folder.
+/// Writes the file with the sums of all other files in the folder.
 pub(super) fn write(folder: &Path) -> TaskResult {
     let lines: String = of_files(folder)?.iter().map(|(name, sum)| format!("{sum}  {name}\n")).collect();
     Ok(fs::write(folder.join(NAME), lines)?)

@@ -10,10 +10,10 @@ use std::process::{Command, Stdio};
 use crate::run::{TaskResult, run_command, target_directory};
 use crate::venv;
 
-/// From PyPI: the compiler for other systems, what calls it, and what makes wheels.
+/// From PyPI: zig, which compiles for other systems, the program that calls it, and the programs that make wheels.
 const PYTHON_PACKAGES: [&str; 5] =
     ["cargo-zigbuild==0.24.1", "maturin==1.16.0", "setuptools==82.0.1", "wheel==0.48.0", "ziglang==0.15.2"];
-/// From crates.io: lists what a program consists of.
+/// From crates.io: the program that lists the parts of a program.
 const CYCLONEDX: (&str, &str) = ("cargo-cyclonedx", "0.5.9");
 
 /// Where the tools are. They are kept for the next release.
@@ -41,7 +41,7 @@ pub(super) fn zigbuild() -> TaskResult<Command> {
 }
 
 /// Makes zig the compiler and the linker of a Linux target for programs with `glibc`. `cargo-zigbuild` and maturin would each call
-/// it by a path of their own, and cargo would build all crates again for the other path.
+/// zig by another path, and cargo would build all crates again for each path.
 pub(super) fn use_zig(command: &mut Command, triple: &str, glibc: &str) -> TaskResult {
     let (target, variable) = (triple.replace("-unknown", ""), triple.replace('-', "_"));
     let compiler = format!("zig cc -- -g -fno-sanitize=all -target {target}.{glibc}");

@@ -24,7 +24,7 @@ use crate::run::{TaskResult, empty_folder, root, run_command};
 pub(super) const UDEV_RULE: &str = "lib/udev/rules.d/70-sevenbot.rules";
 /// Where the licences and the changes are.
 pub(super) const DOC: &str = "share/doc/sevenbot";
-/// The page of the programs that are installed without a package.
+/// The README for users who install the programs from an archive.
 const README: &str = include_str!("../../../packaging/README.txt");
 
 /// Completions: the name of a shell, and its file.
@@ -34,16 +34,16 @@ const COMPLETIONS: [(&str, &str); 3] = [
     ("zsh", "share/zsh/vendor-completions/_sevenbot"),
 ];
 
-/// What is the same on all systems.
+/// The files of an installation that are not programs. They do not depend on the processor.
 pub(super) struct CommonFiles {
     /// The licences and the changes.
     pub(super) documents: Vec<PackedFile>,
-    /// What Linux programs have beside them.
+    /// For Linux only: the manual pages, the completions and the udev rule.
     pub(super) linux: Vec<PackedFile>,
 }
 
 impl CommonFiles {
-    /// `program`: a `sevenbot` that runs on this computer. `licences`: those of all parts.
+    /// `program`: a `sevenbot` that runs on this computer. `licences`: the licences of all parts.
     pub(super) fn new(program: &Path, licences: &str) -> TaskResult<Self> {
         let mut linux = man_pages(program)?;
         for (shell, path) in COMPLETIONS {
@@ -79,7 +79,7 @@ fn documents(licences: &str) -> TaskResult<Vec<PackedFile>> {
     Ok(files)
 }
 
-/// The pages of `sevenbot`, which prints its own, and of `host-sim`.
+/// The manual pages of `sevenbot`, which writes them itself, and of `host-sim`.
 fn man_pages(program: &Path) -> TaskResult<Vec<PackedFile>> {
     let folder = build_directory().join("man");
     empty_folder(&folder)?;

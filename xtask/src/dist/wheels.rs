@@ -59,12 +59,13 @@ fn maturin(release: &Release, what: &str, triple: &str) -> TaskResult<Command> {
     Ok(maturin)
 }
 
-/// setuptools leaves files beside the sources, so it gets a copy. The wheel may be for a later Python than the one that makes it.
+/// setuptools leaves files beside the sources, so it gets a copy. The wheel may be for a later version of Python than
+/// this program uses.
 fn write_pure(release: &Release, folder: &str, name: &str) -> TaskResult {
     let copy = build_directory().join("python").join(name);
     fs::create_dir_all(build_directory().join("python"))?;
     copy_of(&root().join(folder), &copy)?;
-    // A wheel keeps the permissions of its files, which a checkout has from the user's umask.
+    // A wheel keeps the permissions of its files. In a checkout they depend on the user's umask.
     run_command(Command::new("chmod").args(["-R", "u=rwX,go=rX"]).arg(&copy))?;
     let mut pip = Command::new(tools::python()?);
     pip.args(["-m", "pip", "wheel", "--quiet", "--disable-pip-version-check", "--no-deps"]);

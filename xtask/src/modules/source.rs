@@ -99,7 +99,7 @@ impl SourceFile {
         }
     }
 
-    /// A path that begins with `first`.
+    /// Reads a path that begins with `first`. A single name is no path.
     fn path(&mut self, first: String, tokens: &mut Tokens) {
         let mut path = vec![first];
         while skip_colons(tokens) {
@@ -121,7 +121,7 @@ impl SourceFile {
         self.import_tree(&[], tree);
     }
 
-    /// The branches of a tree of imports: `a::{self, b as c, d::*}`.
+    /// Reads the branches of a tree of imports: `a::{self, b as c, d::*}`.
     fn import_tree(&mut self, prefix: &[String], tree: TokenStream) {
         let mut path = prefix.to_vec();
         let mut name = None;
@@ -156,14 +156,15 @@ impl SourceFile {
     }
 }
 
-/// Skips `::`.
+/// Skips `::`. Returns whether it was there.
 fn skip_colons(tokens: &mut Tokens) -> bool {
     let is_colon = |token: &TokenTree| matches!(token, TokenTree::Punct(mark) if mark.as_char() == ':');
     let is_joint = |token: &TokenTree| matches!(token, TokenTree::Punct(mark) if mark.as_char() == ':' && mark.spacing() == Spacing::Joint);
     tokens.next_if(is_joint).is_some() && tokens.next_if(is_colon).is_some()
 }
 
-/// Skips an attribute. Skips the item behind it, too, if that is a test or in a file outside the crate.
+/// Skips an attribute, and the item behind it if the item is a test or in a file outside the crate. Returns whether there was an
+/// attribute.
 fn skip_test(tokens: &mut Tokens) -> bool {
     let Some(TokenTree::Group(attribute)) = tokens.next_if(|token| matches!(token, TokenTree::Group(_)))
     else {

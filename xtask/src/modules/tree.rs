@@ -28,7 +28,7 @@ impl Tree {
         Ok(tree)
     }
 
-    /// Adds a module and those below it, which are in `folder`.
+    /// Adds a module and the modules below it, whose files are in `folder`.
     fn add(&mut self, module: Module, file: PathBuf, folder: &FilePath) -> TaskResult {
         let text = fs::read_to_string(&file).map_err(|why| format!("{}: {why}", file.display()))?;
         let source = SourceFile::parse(&text).map_err(|why| format!("{}: {why}", file.display()))?;

@@ -31,7 +31,7 @@ use crate::run::{BROWSER, TaskResult, cargo, empty_folder, root, run, target_dir
 const PROFILE: &str = "web";
 /// The editor of block programs. The first view does not load it.
 pub(crate) const EDITOR: &str = "programs.js";
-/// How the names of the teacher's screen begin. It is a view of its own.
+/// How the names of the files of the teacher's screen begin. It is another view, so these files are not part of the first view.
 const TEACHER: &str = "teacher.";
 /// The part of the module that the page loads after its first picture.
 const REST: &str = "rest.wasm";
@@ -54,7 +54,7 @@ pub(crate) fn build() -> TaskResult {
     budget::check("web", &figures.map(|(name, size)| Figure::new(name, size)), false)
 }
 
-/// Leaves what the first view needs in the module of the page, and puts the rest beside it.
+/// Leaves the functions that the first view needs in the module of the page, and puts the rest beside it.
 fn split_module(dist: &Path) -> TaskResult {
     let module = dist.join("sevenbot_web_bg.wasm");
     let parts = split::split(&fs::read(&module)?)?;
@@ -68,7 +68,7 @@ pub(crate) fn module(target_directory: &Path) -> PathBuf {
 }
 
 /// Writes the module of the page for browsers, and the script that loads it. The functions keep their names, by which
-/// [`split`] chooses.
+/// [`split`] chooses, unless `bindgen` is set to remove them.
 pub(crate) fn bindgen(bindgen: &mut Bindgen, folder: &Path) -> TaskResult {
     let bindgen = bindgen.remove_producers_section(true).typescript(false);
     Ok(bindgen.generate(folder).map_err(|why| format!("wasm-bindgen: {why:#}"))?)

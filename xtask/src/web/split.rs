@@ -1,4 +1,4 @@
-//! Splits the page's module in two: what its first view needs, and the rest, which the page loads after its first picture.
+//! Splits the page's module in two: the functions for the first view, and the rest, which the page loads after its first picture.
 //!
 //! ```text
 //!   first ── memory, tables, globals, functions ──▶ rest
@@ -21,7 +21,7 @@ use walrus::{
 
 use crate::run::TaskResult;
 
-/// What the first view does not need: parts of the names of functions.
+/// Parts of the names of functions that the first view does not need.
 const LATER: &[&str] = &[
     // Programs, exercises and the class, which read and write JSON.
     "block_programs::",
@@ -53,7 +53,7 @@ const LATER: &[&str] = &[
     "sevenbot_web::movement",
     "sevenbot_web::park",
     "sevenbot_web::recorder",
-    // Things on the table, and what a person does with the picture.
+    // Things on the table, and drags and clicks in the picture.
     "arm_sim::world::moving",
     "arm_sim::world::solid",
     "kinematics::inverse",
@@ -62,7 +62,7 @@ const LATER: &[&str] = &[
     "sevenbot_web::arm_state::breach_on_way",
     "sevenbot_web::scene::drag",
     "sevenbot_web::scene::pointer",
-    // A line that is chosen, and texts.
+    // A serial line that the user chooses, and texts.
     "Fault as core::str::traits::FromStr>",
     "Item as core::fmt::Display>",
     "Scene as core::fmt::Display>",
@@ -122,12 +122,12 @@ fn function_table(module: &Module) -> TaskResult<TableId> {
     Ok(module.tables.main_function_table()?.ok_or("the module has no table of functions")?)
 }
 
-/// Which functions belong to the rest: all that the first part does not reach without a function of [`LATER`].
+/// Which functions belong to the rest: all that the roots do not reach without calling a function of [`LATER`].
 fn later(module: &Module) -> Vec<bool> {
     let is_seed = |id: &FunctionId| {
         let function = module.funcs.get(*id);
         let name = function.name.as_deref().unwrap_or_default();
-        // The first view drops values that were never set.
+        // The first view calls the drop functions of types whose values it never sets.
         let is_drop = name.starts_with("core::ptr::drop_in_place");
         matches!(function.kind, FunctionKind::Local(_))
             && !is_drop
@@ -180,13 +180,14 @@ fn entries(module: &Module, is_later: &[bool]) -> Vec<bool> {
     functions.iter().zip(is_later).map(|(id, is_later)| *is_later && called.contains(id)).collect()
 }
 
-/// The functions of a module for which this holds.
+/// The functions of a module for which `is_chosen` is true.
 fn chosen(module: &Module, is_chosen: &[bool]) -> Vec<FunctionId> {
     let functions = functions(module).into_iter().zip(is_chosen);
     functions.filter_map(|(id, is_chosen)| is_chosen.then_some(id)).collect()
 }
 
-/// Makes each entry a function that calls what the rest has entered in the table, from `start` on.
+/// Replaces each entry by a function that calls the function at its place in the table, where the rest enters it. The places
+/// begin at `start`.
 fn replace_by_calls(module: &mut Module, is_entry: &[bool], start: u64) -> TaskResult {
     let need_rest = module.exports.get_func(NEED_REST)?;
     let table = function_table(module)?;
@@ -216,7 +217,7 @@ fn add_slots(table: &mut Table, entries: usize) -> TaskResult {
     Ok(())
 }
 
-/// Leaves the functions of the rest in a copy of the module. What they use otherwise is imported from the first part.
+/// Leaves the functions of the rest in a copy of the module. Everything else that they use becomes an import from the first part.
 fn make_rest(module: &mut Module, is_later: &[bool], is_entry: &[bool], start: u64) -> TaskResult {
     let table = function_table(module)?;
     let entries = chosen(module, is_entry);
@@ -237,7 +238,7 @@ fn make_rest(module: &mut Module, is_later: &[bool], is_entry: &[bool], start: u
     Ok(())
 }
 
-/// Removes what only the first part has.
+/// Removes the start function, the exports, the imports, the data and the elements, which only the first part has.
 fn clear(module: &mut Module) {
     module.start = None;
     let exports: Vec<_> = module.exports.iter().map(Export::id).collect();
@@ -269,7 +270,7 @@ fn import_state(module: &mut Module) {
     }
 }
 
-/// Exports what the rest imports, under the same name.
+/// Exports the item that the rest imports, under the same name.
 fn export(first: &mut Module, import: &Import) -> TaskResult {
     let item: Option<ExportItem> = match import.kind {
         ImportKind::Function(id) => first.funcs.iter().nth(id.index()).map(|item| item.id().into()),

@@ -16,7 +16,7 @@ fn steps(motor: &mut Motor, count: u32, mode: MotorMode) {
     (0..count).for_each(|_| motor.step(mode));
 }
 
-/// Steps until the motor has arrived.
+/// Drives the motor until it has arrived. Returns the number of steps.
 fn duration_ms(motor: &mut Motor) -> u32 {
     for step in 0..100_000 {
         if !motor.is_moving() {

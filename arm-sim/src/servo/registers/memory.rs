@@ -2,7 +2,7 @@
 
 use motion_core::servo_bus::frame::{BROADCAST, register};
 
-/// Number of registers. Register 70 is the last of a read of 15 from the present position.
+/// Number of registers: 0 to 70. A read of 15 registers from the present position (56) on ends at register 70.
 pub(super) const COUNT: usize = 71;
 /// The first EEPROM register that a master can write while the lock is open.
 const FIRST_SETTING: u8 = register::ID;

@@ -181,7 +181,7 @@ impl Client {
         self.send(Request::Read { address, count });
     }
 
-    /// Reads registers.
+    /// Reads registers, and waits for the answer.
     pub(crate) fn read(&mut self, address: u8, count: u8) -> Vec<u8> {
         self.send_read(address, count);
         self.answer(address, count)
@@ -218,8 +218,8 @@ impl Client {
         }
     }
 
-    /// Passes the received bytes to the deframer: those that wait, or the next ones from the port. No bytes tell it that the line
-    /// is idle.
+    /// Passes bytes to the deframer: the bytes that it has not taken yet, or the next bytes from the port. An empty slice tells
+    /// the deframer that the line is idle.
     fn receive(&mut self) {
         if self.received.is_empty() && self.waits_readable() {
             let mut bytes = [0; 4_096];

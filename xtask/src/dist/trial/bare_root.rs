@@ -21,7 +21,7 @@ const ENTER: &str = "mount -t proc proc \"$1/proc\" && mount --rbind /dev \"$1/d
 pub(super) struct BareRoot(TempDir);
 
 impl BareRoot {
-    /// A fresh one, whose folder `/release` has these files.
+    /// A freshly unpacked system with these files in its folder `/release`.
     pub(super) fn with(files: &[PathBuf]) -> TaskResult<Self> {
         let packed = packed()?;
         let folder = TempDir::new_in(directory())?;
@@ -40,7 +40,7 @@ impl BareRoot {
         Ok(Self(folder))
     }
 
-    /// Runs a script of the shell inside, in a folder where it may write.
+    /// Runs a shell script in this system, in a folder where the script may write.
     pub(super) fn run(&self, script: &str) -> TaskResult {
         let mut command = Command::new("unshare");
         command.args(["--mount", "--pid", "--fork", "--kill-child", "sh", "-c", ENTER, "sh"]);
@@ -58,7 +58,7 @@ fn packed() -> TaskResult<PathBuf> {
     make(&directory().join("debian.tar"), &["--variant=minbase", PYTHON])
 }
 
-/// Another system, with these options of mmdebstrap.
+/// Makes a packed system with these options of mmdebstrap, unless `path` exists. Needs root.
 pub(super) fn make(path: &Path, options: &[&str]) -> TaskResult<PathBuf> {
     if !rustix::process::geteuid().is_root() {
         return Err("a bare Debian is made and entered by root only: run this step as root".into());

@@ -32,13 +32,13 @@ for second in 1 2 3 4 5 6 7 8 9 10; do test -s ready || sleep 1; done
 sevenbot --port /root/7bot pose 90 90 65 90 90 90 60 --wait
 kill $!
 "#;
-/// The archive, unpacked as packaging/README.txt says. `$ARCHIVE`: its name.
+/// Unpacks the archive as packaging/README.txt says. `$ARCHIVE`: its name.
 const FROM_ARCHIVE: &str = r#"
 mkdir .local
 tar xzf /release/$ARCHIVE -C .local --strip-components=1
 PATH=/root/.local/bin:$PATH
 "#;
-/// The package, and the list of all files before it. `$PACKAGE`: its name.
+/// Lists all files, then installs the package and checks some of its files. `$PACKAGE`: its name.
 const FROM_PACKAGE: &str = r#"
 all_files() { find / -xdev -not -path '/proc/*' -not -path '/dev/*' -not -path '/root/*' -not -path '/var/lib/dpkg/*' \
     -not -path '/var/log/*' -not -path '/var/cache/*' | sort; }
@@ -70,7 +70,7 @@ assert len(sevenbot.Recording.load(path)) > 10
 print(sys.version.split()[0], 'posed and recorded')
 ";
 
-/// The archive and the package of this computer, on a bare system each.
+/// Tries the archive and the package for this computer, one after the other on the same bare system.
 pub(super) fn programs(release: &Release) -> TaskResult {
     let platform = host_platform()?;
     let (archive, package) =
@@ -84,7 +84,7 @@ pub(super) fn programs(release: &Release) -> TaskResult {
     root.run(&format!("{set}{FROM_PACKAGE}{FIRST_MINUTE}{PURGED}"))
 }
 
-/// `lintian` finds no error in the packages.
+/// Checks with `lintian` that the Debian packages have no errors.
 pub(super) fn packages_are_flawless(release: &Release) -> TaskResult {
     for debian in PLATFORMS.iter().filter_map(|platform| platform.debian) {
         let mut lintian = Command::new("lintian");

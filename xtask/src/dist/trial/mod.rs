@@ -1,8 +1,8 @@
-//! Installs what a release consists of as its users do, and uses it.
+//! Installs the parts of a release as its users do, and uses them.
 //!
 //! ```text
 //!   archive, .deb, wheel ──▶ a bare Debian: no compiler, no Rust
-//!   wheels               ──▶ each Python on PATH; aarch64 in qemu
+//!   wheels               ──▶ each Python on this computer; aarch64 in qemu
 //!   sevenbot.exe         ──▶ Wine
 //!   page                 ──▶ Chromium, from the disk and from a web server
 //! ```

@@ -15,7 +15,7 @@ use crate::dist::page::{file_name, folder_name};
 use crate::dist::release::Release;
 use crate::run::{ChildProcess, TaskResult, run_command, wait_for};
 
-/// Serves a folder at a free port, and prints the port.
+/// Serves a folder at a free port, and writes the port to a file.
 const SERVER: &str = "
 import functools, http.server, sys
 handler = functools.partial(http.server.SimpleHTTPRequestHandler, directory=sys.argv[1])
@@ -23,11 +23,11 @@ server = http.server.ThreadingHTTPServer(('127.0.0.1', 0), handler)
 open(sys.argv[2], 'w').write(f'{server.server_port}\\n')
 server.serve_forever()
 ";
-/// A program of one block, and what it is in Python.
+/// A program with one block after its start, and the text of this block in Python.
 const PROGRAM: &str = r#"{"blocks": {"blocks": [{"type": "arm_start", "id": "a", "next": {"block":
     {"type": "arm_vacuum", "id": "b", "fields": {"STATE": "ON"}}}}]}}"#;
 const PYTHON: &str = "arm.set(\"vacuum-pump\", 1)";
-/// The page has drawn its seven joints when this is in it seven times.
+/// The page has drawn its seven joints when it contains this text at least seven times.
 const SLIDER: &str = "type=\"range\"";
 const JOINTS: usize = 7;
 
@@ -61,7 +61,7 @@ fn with_program(address: &str) -> TaskResult<String> {
     Ok(format!("{address}#program={}", BASE64_URL_SAFE_NO_PAD.encode(encoder.finish()?)))
 }
 
-/// The page at this address starts, without any other file of this computer, and shows a program of blocks.
+/// Checks that the page at this address starts, and that it shows the joints and the program in its address.
 fn shows_joints(address: &str) -> TaskResult {
     let profile = TempDir::new()?;
     let mut browser = Command::new("chromium");

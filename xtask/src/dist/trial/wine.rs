@@ -111,7 +111,7 @@ impl Wine {
         if lines > 10 { Ok(()) } else { Err(format!("{lines} lines were recorded").into()) }
     }
 
-    /// The monitor draws its seven joints, and ends by its key.
+    /// Checks that the monitor draws seven joints, and that the key q ends it.
     fn monitor(&self, port: &str) -> TaskResult {
         let program = self.folder.path().join("programs/sevenbot.exe").display().to_string();
         let variables: Vec<_> =
@@ -141,8 +141,8 @@ impl Wine {
     }
 }
 
-/// The output of a program without what the console of Wine 8 adds. It takes escape sequences for text: it begins a new row after each
-/// 80 characters, and sometimes draws the present row again.
+/// The output of a program without the additions of the console of Wine 8. This console treats escape sequences as text: it
+/// begins a new row after each 80 characters, and sometimes draws the present row again.
 fn without_console(output: &[u8]) -> Vec<u8> {
     const NEW_ROW: &[u8] = b"\r\r\n";
     const ROW_AGAIN: &[u8] = b"\x1b[K\x1b[?25h\x1b[?25l\r";
@@ -162,7 +162,7 @@ fn without_console(output: &[u8]) -> Vec<u8> {
     written
 }
 
-/// The simulator of the release on this computer, and its port.
+/// Starts the simulator of the release on this computer. Returns its process and its port.
 fn simulator(release: &Release, folder: &Path) -> TaskResult<(ChildProcess, PathBuf)> {
     let mut tar = Command::new("tar");
     tar.args(["--extract", "--directory"]).arg(folder).arg("--file");
