@@ -1,4 +1,4 @@
-//! Passes the linker scripts to the linker: `memory.x` from the root of the workspace, and those of cortex-m-rt and defmt.
+//! Passes the linker scripts to the linker: `memory.x` from the root of the workspace, `link.x` of cortex-m-rt, `defmt.x`.
 //! The flags apply only to this package, so they are here and not in `.cargo/config.toml`.
 
 use std::path::PathBuf;

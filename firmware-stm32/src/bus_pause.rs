@@ -1,7 +1,7 @@
 //! When to save settings. Programming a word stalls the core for 16 to 100 microseconds, and at 1 Mbaud a byte that is not
 //! read within 10 microseconds is lost. So a save waits for a pause on both lines, with a timeout.
 
-/// The wait for a pause.
+/// A wait for a pause on both lines.
 #[derive(Clone, Copy, Debug)]
 pub struct PauseWait {
     quiet_micros: u32,
@@ -12,7 +12,7 @@ pub struct PauseWait {
 }
 
 impl PauseWait {
-    /// Starts a wait for `quiet_micros` without a byte that ends after `timeout_micros` at the latest. `now` is the
+    /// Starts a wait. It ends when no byte was received or sent for `quiet_micros`, or after `timeout_micros`. `now` is the
     /// value of a microsecond counter that wraps.
     #[must_use]
     pub const fn new(now: u32, quiet_micros: u32, timeout_micros: u32) -> Self {

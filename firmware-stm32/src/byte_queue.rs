@@ -1,7 +1,7 @@
 //! A queue of bytes between an interrupt and the main loop.
 //!
-//! Both access it in a critical section. So, unlike `heapless::spsc::Queue`, it needs no atomic indices, and it moves many
-//! bytes at once: 7 instructions for each byte that the loop queues, instead of 16.
+//! Interrupt and loop access it in critical sections. So, unlike `heapless::spsc::Queue`, it needs no atomic indices, and it
+//! moves many bytes at once: 7 instructions for each byte that the loop queues, instead of 16.
 
 /// A queue of up to `N` bytes. `N` is a power of two.
 pub struct ByteQueue<const N: usize> {
@@ -65,7 +65,7 @@ impl<const N: usize> ByteQueue<N> {
         bytes.len()
     }
 
-    /// Moves the oldest bytes to `bytes`, as many as there are and fit, and returns how many.
+    /// Moves the oldest bytes to `bytes`, as many as are queued and fit, and returns how many.
     pub fn pop_all(&mut self, bytes: &mut [u8]) -> usize {
         if self.is_empty() {
             return 0;
@@ -81,12 +81,12 @@ impl<const N: usize> ByteQueue<N> {
         count
     }
 
-    /// Drops the newest bytes, so that `len` are left.
+    /// Drops the newest bytes, so that at most `len` are left.
     pub fn truncate(&mut self, len: usize) {
         self.len = self.len.min(len);
     }
 
-    /// Takes the oldest byte.
+    /// Takes the oldest byte; `None` if the queue is empty.
     pub fn pop(&mut self) -> Option<u8> {
         if self.is_empty() {
             return None;

@@ -14,7 +14,7 @@ use crate::clock_rates::INTERNAL_HZ;
 pub const DIVIDER: u8 = 31;
 /// Periods of the divided crystal in one capture, IC1PSC of TIM11_CCMR1.
 const PERIODS_PER_CAPTURE: u32 = 8;
-/// Captures of one measurement, besides the first.
+/// Intervals between captures in one measurement.
 const CAPTURES: u32 = 16;
 /// Cycles of the crystal in one measurement: 0.5 ms at 8 MHz.
 const CYCLES: u32 = DIVIDER as u32 * PERIODS_PER_CAPTURE * CAPTURES;
@@ -22,9 +22,9 @@ const CYCLES: u32 = DIVIDER as u32 * PERIODS_PER_CAPTURE * CAPTURES;
 const TOLERANCE: u32 = 5;
 
 /// Measures the crystal, in kHz. `capture` returns the next captured count of a timer at the internal oscillator's frequency.
-/// `None` if it returns `None`: no capture came in time, or one was missed.
+/// `None` if `capture` returns `None`: no capture came in time, or one was missed.
 pub fn measure_khz(mut capture: impl FnMut() -> Option<u16>) -> Option<u32> {
-    // The first two captures may belong to the time before the timer was set up.
+    // Drop the first capture: it may belong to the time before the timer was set up.
     capture()?;
     let first = capture()?;
     let mut last = first;
@@ -50,11 +50,11 @@ pub const fn are_distinct(fitted: &[u8]) -> bool {
     let mut rest = fitted;
     let mut lowest = 4;
     while let [mhz, behind @ ..] = rest {
-        // `as` widens.
+        // Each `as` below widens.
         if *mhz < lowest || *mhz > 26 {
             return false;
         }
-        // The next crystal is above the tolerances of both.
+        // The next crystal must be so far above this one that their tolerances do not overlap.
         let above = *mhz as u32 * (100 + TOLERANCE) / (100 - TOLERANCE) + 1;
         lowest = if above < 27 { above.to_le_bytes()[0] } else { 27 };
         rest = behind;
@@ -68,7 +68,8 @@ mod tests {
 
     const FITTED: &[u8] = &[8, 12, 16, 25];
 
-    /// The measurement of a crystal with an internal oscillator that is wrong by this factor. The timer wraps.
+    /// The measured frequency of a crystal, in kHz, if the internal oscillator runs at `factor` times its nominal 16 MHz. The
+    /// count starts close to its wrap.
     fn measured(crystal_hz: f64, factor: f64) -> Option<u32> {
         let mut captures = 0_u32;
         measure_khz(|| {

@@ -1,12 +1,12 @@
-//! The two journal sectors as a NOR flash (RM0090, sections 3.6 and 3.9). It does not know what is stored there, and
+//! The two journal sectors as a NOR flash (RM0090, sections 3.6 and 3.9). This file does not know what is stored there, and
 //! accesses the chip only through [`FlashRegisters`].
 //!
 //! The core stalls while a word is programmed (16 microseconds) or a sector is erased (up to 0.8 s), because it fetches
 //! its instructions from the same bank. Interrupts run between two words. Sectors are erased only at start, before the
 //! servos are controlled.
 //!
-//! Each word is read back. A word that differs is an error: in the emulator no cell changes. A write also updates the
-//! data cache, so the cache is flushed before the read.
+//! Each programmed word is read back. A word that differs is an error, as in the emulator, where no cell changes. A write
+//! also updates the data cache, so the cache is flushed before the read.
 //! Tests: `flash/tests.rs`.
 
 use embedded_storage::nor_flash::{
@@ -62,7 +62,7 @@ pub mod status {
 /// The keys that unlock FLASH_CR, in this order.
 pub const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
 
-/// The registers and cells of the flash, and what its driver needs of the chip.
+/// The registers and cells of the flash, and the supply monitor, watchdog and clock that its driver needs.
 pub trait FlashRegisters {
     /// Reads FLASH_SR.
     fn status(&self) -> u32;
@@ -87,7 +87,7 @@ pub trait FlashRegisters {
     fn resets_when_supply_sags(&self) -> bool;
     /// Switches the supply monitor on at `level`, 0 to 7.
     fn watch_supply(&mut self, level: u8);
-    /// True if the supply is below that level now.
+    /// True if the supply is below the level of [`Self::watch_supply`] now.
     fn supply_is_low(&self) -> bool;
     /// Feeds the watchdog.
     fn feed_watchdog(&mut self);
@@ -107,7 +107,7 @@ pub enum Error {
     Supply,
     /// The chip refused the operation. Holds the error bits of FLASH_SR.
     Refused(u32),
-    /// The operation did not end in time.
+    /// The operation did not end in time, or an earlier one is still running.
     Timeout,
     /// The chip reported no error, but the cells do not hold the programmed word.
     Unchanged,
@@ -128,12 +128,12 @@ impl From<NorFlashErrorKind> for Error {
     }
 }
 
-/// The journal sectors.
+/// The driver of the two journal sectors.
 #[derive(Debug)]
 pub struct Flash<C>(C);
 
 impl<C: FlashRegisters> Flash<C> {
-    /// Takes ownership of the flash, and starts the supply monitor.
+    /// Takes ownership of the flash, starts the supply monitor, and waits until it has started.
     pub fn new(mut chip: C) -> Self {
         chip.watch_supply(SUPPLY_LEVEL);
         let start = chip.micros();
@@ -141,7 +141,7 @@ impl<C: FlashRegisters> Flash<C> {
         Self(chip)
     }
 
-    /// Unlocks the flash, runs `operation`, and locks it again.
+    /// Unlocks the flash, runs `operation`, and locks the flash again unless it is busy. Logs an error.
     fn unlocked(&mut self, operation: impl FnOnce(&mut Self) -> Result<(), Error>) -> Result<(), Error> {
         if self.0.control() & control::LOCK != 0 {
             KEYS.into_iter().for_each(|key| self.0.enter_key(key));
@@ -180,7 +180,7 @@ impl<C: FlashRegisters> Flash<C> {
         if self.0.load(offset) == word { Ok(()) } else { Err(Error::Unchanged) }
     }
 
-    /// Checks the brown-out level and the supply, and clears old status bits.
+    /// Checks that no operation is running, then checks the brown-out level and the supply. Clears old status bits.
     fn make_ready(&mut self) -> Result<(), Error> {
         if self.is_busy() {
             return Err(Error::Timeout);

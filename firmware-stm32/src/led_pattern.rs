@@ -1,4 +1,4 @@
-//! The LED pattern of the self-test image: the number of flashes is the last step, their pace its result.
+//! The LED pattern of the self-test image: the number of flashes tells the last step, their pace tells its result.
 //!
 //! ```text
 //!   step 3, passed   ▇▇__▇▇__▇▇__________▇▇__▇▇__▇▇__________      400 ms per flash

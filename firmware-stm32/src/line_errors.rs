@@ -7,11 +7,11 @@ use crate::usart_status::{FRAMING, NOISE, OVERRUN};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(target_os = "none", derive(defmt::Format))]
 pub struct LineErrors {
-    /// At least one byte was lost, because it was not read before the next one was complete.
+    /// How often bytes were lost, because one was not read before the next one was complete.
     pub overruns: u16,
-    /// The stop bit was missing.
+    /// How often the stop bit was missing.
     pub framing: u16,
-    /// The samples of a bit differed.
+    /// How often the samples of a bit differed.
     pub noise: u16,
 }
 

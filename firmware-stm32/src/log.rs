@@ -11,7 +11,7 @@ use protocol_core::time::{Duration, Instant};
 /// Time between two groups of lines about the serial lines.
 const PERIOD: Duration = Duration::from_millis(1_000);
 
-/// The next line about the serial lines.
+/// The next log line about the serial lines. The three follow each other in this order.
 #[derive(Clone, Copy)]
 enum NextLine {
     /// Errors of the host link.
@@ -35,7 +35,7 @@ pub(crate) struct Log {
 }
 
 impl Log {
-    /// A log that begins now.
+    /// A log whose first line is due at once.
     pub(crate) const fn new() -> Self {
         let gate = LogGate::new(Instant::ZERO);
         Self {

@@ -1,9 +1,9 @@
 //! When the firmware may write a log line. The log masks all interrupts for a whole line, longer than a byte lasts at 1 Mbaud,
-//! so a line is written only while nothing comes. With a debugger attached the log goes first.
+//! so a log line is written only while both serial lines are idle. With a debugger attached it is written at once.
 
 use protocol_core::time::{Duration, Instant};
 
-/// A line is idle after this time without a byte: longer than a servo waits before it answers.
+/// A serial line is idle after this time without a byte: longer than a servo waits before it answers.
 const QUIET: Duration = Duration::from_millis(1);
 
 /// Keeps the time of the last byte.
@@ -13,7 +13,7 @@ pub struct LogGate {
 }
 
 impl LogGate {
-    /// A gate at `now`. It stays closed for the quiet time.
+    /// A gate that counts a byte at `now`, so it stays closed for the quiet time.
     #[must_use]
     pub const fn new(now: Instant) -> Self {
         Self { last_byte: now }

@@ -1,4 +1,4 @@
-//! The firmware: the controller of the simulator on an STM32F405, with the drivers that connect it to the hardware.
+//! The firmware: the same controller as in the simulator, and the drivers that connect it to the hardware of an STM32F405.
 //!
 //! ```text
 //!   host ══ USART1 ◀─ host_link ─▶ ┌────────────┐ ◀─ servo_link ─▶ USART2 ══ seven servos
@@ -32,7 +32,7 @@ use stm32f4::stm32f405 as pac;
 use crate::log::Log;
 use crate::main_loop::MainLoop;
 
-/// `cargo xtask dist` adds the commit.
+/// The version in the log. `cargo xtask dist` sets `SEVENBOT_RELEASE`, which adds the commit.
 const VERSION: &str = match option_env!("SEVENBOT_RELEASE") {
     Some(release) => release,
     None => env!("CARGO_PKG_VERSION"),

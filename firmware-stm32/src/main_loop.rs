@@ -137,9 +137,9 @@ impl MainLoop<'_> {
         self.outputs.led.set(is_well || now.as_micros() & BLINK == 0);
     }
 
-    /// Sleeps until `until`, the next tick of the system timer, or the arrival of enough bytes. Fewer bytes, and interrupts
-    /// that send, do not end the sleep. Wake one byte early, so that only the last of the `wanted` bytes is left to
-    /// process.
+    /// Sleeps until `until`, the next tick of the system timer, a byte from the servos, or enough bytes from the host. Fewer
+    /// bytes from the host, and interrupts that send, do not end the sleep. Wake one byte early, so that only the last of
+    /// the `wanted` bytes is left to process.
     fn sleep(&mut self, until: Instant, wanted: usize) {
         let enough = wanted.saturating_sub(1).max(1);
         let _ = self.clock.has_ticked();
@@ -165,7 +165,8 @@ impl MainLoop<'_> {
     }
 }
 
-/// Queues bytes for sending. The queue has room: `poll` was told how much, and the servo bus is idle before each frame.
+/// Queues bytes for sending. The queue has room: the caller passes the room of the host link to `poll`, and the servo bus is
+/// idle before each frame.
 fn send(line: &mut impl Write<Error = Infallible>, bytes: &[u8]) {
     let Ok(()) = line.write_all(bytes);
 }

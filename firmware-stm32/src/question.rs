@@ -1,5 +1,5 @@
-//! The only frames that the self-test image sends to the servos: pings and reads. No constructor of [`Question`] makes a
-//! write, so the image cannot switch torque on or send a goal.
+//! The only frames that the self-test image sends to the servos, except in a crash: pings and reads. No constructor of
+//! [`Question`] makes a write, so the image cannot switch torque on or send a goal.
 
 use motion_core::servo_bus::frame::{self, Decoder, Reading, ServoFrameBuffer, register};
 
@@ -14,7 +14,7 @@ pub struct Question {
 
 /// The first of the ids that stand for absent servos. The servos of this arm have ids 0 to 6.
 const FIRST_ABSENT_ID: u8 = 8;
-/// How many ids there are from there up to 253. 254 is the broadcast id.
+/// How many ids there are from [`FIRST_ABSENT_ID`] to 253. 254 is the broadcast id.
 const ABSENT_IDS: u16 = 246;
 
 impl Question {
@@ -59,7 +59,7 @@ impl Question {
         &self.frame
     }
 
-    /// Finds the answer in the received bytes and returns its parameters. The echo may come before it.
+    /// Finds the answer in the received bytes and returns its parameters; `None` without an answer. The echo may come first.
     #[must_use]
     pub fn answer(&self, received: &[u8]) -> Option<Answer> {
         let mut decoder = Decoder::new();
@@ -75,7 +75,7 @@ impl Question {
         None
     }
 
-    /// Removes the echo. The echo of a ping would parse as an answer, because only the code differs.
+    /// Removes the echo. The echo of a ping would parse as an answer, because the two differ only in code and checksum.
     fn without_echo<'a>(&self, received: &'a [u8]) -> &'a [u8] {
         received.strip_prefix(self.frame.as_slice()).unwrap_or(received)
     }

@@ -33,7 +33,8 @@ impl ReadOnlyBus {
         self.link.errors()
     }
 
-    /// Sends a question. Returns the answer and its delay after the last byte of the question, in microseconds.
+    /// Sends a question. Returns the answer and its delay after the last byte of the question, in microseconds; `None` if no
+    /// answer comes before the timeout.
     pub(crate) fn ask(&mut self, question: &Question) -> Option<(Answer, u32)> {
         let mut answer = None;
         let taken = self.listen(question, |received| {
@@ -43,8 +44,8 @@ impl ReadOnlyBus {
         answer.map(|answer| (answer, taken))
     }
 
-    /// Sends a question to an absent servo, and returns the bytes received before the timeout. On a wire the echo is
-    /// complete with the last byte sent.
+    /// Sends a question to an absent servo, and returns the received bytes as soon as they are as many as the question has, or
+    /// at the timeout. On a wire the echo is complete with the last byte sent.
     pub(crate) fn echo(&mut self, question: &Question) -> ReceivedBytes {
         let mut echo = ReceivedBytes::new();
         self.listen(question, |received| {
@@ -56,7 +57,8 @@ impl ReadOnlyBus {
         echo
     }
 
-    /// Sends a question and receives until `is_enough` or the timeout. Returns the time after the last byte sent.
+    /// Sends a question and receives until `is_enough` or the timeout. Returns the time since the last byte of the question
+    /// was sent, in microseconds.
     fn listen(&mut self, question: &Question, mut is_enough: impl FnMut(&[u8]) -> bool) -> u32 {
         delay_micros(u32::try_from(board::SERVO_GUARD_TIME.as_micros()).unwrap_or(u32::MAX));
         self.take(&mut ReceivedBytes::new());

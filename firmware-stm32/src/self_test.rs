@@ -11,8 +11,8 @@
 //! Each step runs when its letter arrives on the host link, at 115,200 baud; step a also runs at start. Results go to the
 //! host link as text, to the log, and to the LED (`led_pattern.rs`).
 //!
-//! The motor state is always 2. The image has no controller, the servo bus sends only questions (`question.rs`), and a
-//! crash damps the servos. So no servo gets torque, even if their inrush current resets the board.
+//! No servo gets torque, even if the inrush current of the servos resets the board: the image has no controller, its servo
+//! bus sends only questions (`question.rs`), and a crash damps the servos.
 
 #![no_std]
 #![no_main]

@@ -22,7 +22,7 @@ mod tests;
 /// The event of the transmitter that raises the interrupt. A received byte always raises it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TransmitEvent {
-    /// None.
+    /// No event of the transmitter.
     Never,
     /// The data register takes a byte (TXEIE).
     Empty,
@@ -46,9 +46,9 @@ pub trait UsartRegisters {
 pub trait BusDirection {
     /// False for a line without such a buffer: then neither function is called.
     const IS_SWITCHED: bool;
-    /// The board drives the bus.
+    /// Makes the board drive the bus.
     fn transmit(&mut self);
-    /// The board listens.
+    /// Makes the board listen.
     fn receive(&mut self);
 }
 
@@ -67,7 +67,7 @@ impl BusDirection for NoDirection {
 pub enum Taken {
     /// This many bytes; 0 if there are none.
     Bytes(usize),
-    /// A damaged byte, or a gap where bytes were lost. It is taken.
+    /// A damaged byte, or a gap where bytes were lost. It is already removed from the queue.
     Damage,
 }
 
@@ -80,17 +80,17 @@ impl Default for Taken {
 /// The byte in the queue at a mark. Its value has no meaning.
 const MARK: u8 = 0;
 
-/// A line.
+/// A serial line. `RECEIVE` and `TRANSMIT` are the sizes of its queues, in bytes.
 pub struct SerialLine<U, D, const RECEIVE: usize, const TRANSMIT: usize> {
     usart: U,
     direction: D,
     received: ByteQueue<RECEIVE>,
-    /// How many bytes of `received` come before the mark.
+    /// How many bytes of `received` come before the mark; `None` without a mark.
     mark_at: Option<usize>,
     to_send: ByteQueue<TRANSMIT>,
     /// See [`Self::is_sending()`].
     is_sending: bool,
-    /// What the USART's interrupt is set to.
+    /// The event that was last passed to [`UsartRegisters::interrupt_on`].
     event: TransmitEvent,
     errors: LineErrors,
 }
@@ -122,7 +122,7 @@ impl<U: UsartRegisters, D: BusDirection, const RECEIVE: usize, const TRANSMIT: u
         is_taken
     }
 
-    /// Moves a received byte to the queue.
+    /// Moves a received byte to the queue. Returns false if the queue is full.
     fn receive(&mut self, status: u16) -> bool {
         let seen = status & (status::RECEIVED | status::ERRORS);
         if seen == 0 {
@@ -148,14 +148,14 @@ impl<U: UsartRegisters, D: BusDirection, const RECEIVE: usize, const TRANSMIT: u
             // An overrun: this byte is good, the one behind it is lost.
             self.received.push(byte);
         }
-        // There is only one mark: drop the bytes between two. In a full queue it takes the place of the newest byte.
+        // There is only one mark, so drop the bytes behind an older one. In a full queue the mark replaces the newest byte.
         let at = self.mark_at.unwrap_or(self.received.len()).min(RECEIVE - 1);
         self.received.truncate(at);
         self.received.push(MARK);
         self.mark_at = Some(at);
     }
 
-    /// Passes queued bytes to the transmitter. Behind the last one, ends the transmission.
+    /// Passes queued bytes to the transmitter. Ends the transmission after the last one.
     fn send(&mut self, status: u16) {
         let mut status = status;
         while status & status::EMPTY != 0
@@ -185,7 +185,7 @@ impl<U: UsartRegisters, D: BusDirection, const RECEIVE: usize, const TRANSMIT: u
         }
     }
 
-    /// Queues as many of `bytes` as there is room for, and returns how many. If it queued any, raise the interrupt.
+    /// Queues as many of `bytes` as there is room for, and returns how many. If it queued any, pend the interrupt.
     pub fn push(&mut self, bytes: &[u8]) -> usize {
         let count = self.to_send.push_all(bytes);
         if count > 0 {
@@ -197,7 +197,7 @@ impl<U: UsartRegisters, D: BusDirection, const RECEIVE: usize, const TRANSMIT: u
         count
     }
 
-    /// Moves the oldest received bytes to `bytes`, as many as there are and fit, up to a mark.
+    /// Moves the oldest received bytes to `bytes`, as many as are queued and fit, up to a mark.
     pub fn take(&mut self, bytes: &mut [u8]) -> Taken {
         match self.mark_at {
             None => Taken::Bytes(self.received.pop_all(bytes)),

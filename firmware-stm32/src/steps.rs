@@ -101,7 +101,7 @@ impl SelfTest {
         }
     }
 
-    /// Waits for a letter.
+    /// Waits for a letter. Updates the LED and feeds the watchdog meanwhile.
     fn command(&mut self) -> u8 {
         loop {
             if let Received::Bytes(&[letter, ..]) = self.host.received() {
@@ -189,7 +189,8 @@ impl SelfTest {
         self.show(3, 'c', answers == QUESTIONS && reading.is_some() && torque != TORQUE_ON);
     }
 
-    /// Returns the lowest id that answers. A servo answers some 200 ms after its supply is switched on.
+    /// Returns the first id that answers; `None` after [`SEARCH_MICROS`]. A servo answers some 200 ms after its supply is
+    /// switched on.
     fn find_servo(&mut self) -> Option<u8> {
         let start = clock::micros();
         while clock::micros().wrapping_sub(start) < SEARCH_MICROS {
@@ -203,7 +204,7 @@ impl SelfTest {
         None
     }
 
-    /// Runs until the next command.
+    /// Reads all servos every [`LINE_MICROS`], until the next command arrives.
     fn seven_servos(&mut self) {
         loop {
             let start = clock::micros();

@@ -5,8 +5,8 @@ pub fn wait_for(polls: u32, flag: impl Fn() -> bool) -> bool {
     (0..polls).any(|_| flag())
 }
 
-/// Polls `flag` for up to `limit_micros`, by a counter of microseconds that wraps. Returns true as soon as it is set, false
-/// when the time is over.
+/// Polls `flag` for up to `limit_micros`. `micros` reads a counter of microseconds that wraps. Returns true as soon as the
+/// flag is set, false when the time is over.
 pub fn wait_within(limit_micros: u32, micros: impl Fn() -> u32, flag: impl Fn() -> bool) -> bool {
     let start = micros();
     loop {

@@ -71,7 +71,7 @@ impl ArmControl {
         }
     }
 
-    /// Processes the answers of the servos.
+    /// Processes the answers of the servos and their timeouts, and ends start-up when it is over.
     pub(crate) fn take_answers(&mut self, now: Instant) {
         while let Some(outcome) = self.bus.outcome(now) {
             self.take_outcome(now, outcome);
@@ -88,8 +88,8 @@ impl ArmControl {
         }
     }
 
-    // Not inlined, like other functions here: most polls do not call it, but with it inlined all would save its CPU
-    // registers.
+    // Not inlined, like other functions here: most polls do not call it, but if it were inlined, every poll would save the
+    // CPU registers that it uses.
     #[inline(never)]
     fn begin_cycle(&mut self, now: Instant, end: Instant) {
         self.bus.begin_cycle(end);
@@ -146,8 +146,8 @@ impl ArmControl {
         self.bus.prepare_frame(now, &mut self.joints, &self.registers)
     }
 
-    /// Executes a write of the host in map 2.2, or refuses it completely. Returns whether it may have changed a report
-    /// frequency.
+    /// Executes a write of the host in map 2.2, or refuses it completely. Returns whether it may have changed the frequency
+    /// or the content of reports.
     #[inline(never)]
     pub(crate) fn write(&mut self, now: Instant, address: u8, values: &[u8]) -> bool {
         let accepted = match self.registers.check(address, values) {
@@ -205,7 +205,7 @@ impl ArmControl {
         self.joints.against_limit(&LimitCheck { accepted, reached, limits })
     }
 
-    /// Refuses a write. Returns `false`, because a refused write changes no report frequency.
+    /// Refuses a write. Returns `false`, because a refused write does not change the reports.
     fn refuse(&mut self, reason: u8, address: u8) -> bool {
         Status::refuse(&mut self.registers, reason, address);
         false
@@ -223,7 +223,7 @@ impl ArmControl {
 
     /// Executes a checked write.
     fn execute(&mut self, now: Instant, accepted: &Accepted<'_>, changes_settings: bool) {
-        // Before the rest of the frame, so that a target in it replaces the measured position (D13).
+        // The motor state comes before the rest of the frame, so that a target in it replaces the measured position (D13).
         self.set_motor_state(accepted);
         // A new period counts from the next point on (D23): points in the same frame still use the old one.
         let period = self.registers.word(SET_POINT_PERIOD.address);
@@ -288,7 +288,7 @@ impl ArmControl {
         }
     }
 
-    /// Enters state 0 by itself ([D24](protocol_core::decisions#d24), [D29](protocol_core::decisions#d29)).
+    /// Enters state 0 without a write of the host ([D24](protocol_core::decisions#d24), [D29](protocol_core::decisions#d29)).
     fn damp(&mut self) {
         self.registers.set(MOTOR_STATE.address, motor_state::DAMPING);
         self.enter_state(MotorState::Damping);
@@ -310,7 +310,7 @@ impl ArmControl {
         self.joints.rebase_offsets(&offsets, &self.registers);
     }
 
-    /// Ends a silence of the host: a well-formed frame had its turn at `now`.
+    /// Ends a silence of the host, because a well-formed frame had its turn at `now`.
     pub(crate) fn heard_host(&mut self, now: Instant) {
         self.watchdog.heard(now);
     }

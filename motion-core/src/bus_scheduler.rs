@@ -24,7 +24,7 @@ const START_UP_TIME: Duration = Duration::from_millis(500);
 /// The torque switches are set again after this many control cycles, in case a frame was lost.
 const TORQUE_REFRESH_CYCLES: u8 = 25;
 /// This many cycles before a refresh, the scheduler begins to read the torque switches that were not read since the
-/// last one: a switch is refreshed only if a read showed it on ([D28](protocol_core::decisions#d28)). The time is
+/// last refresh: a switch is refreshed only if a read showed it on ([D28](protocol_core::decisions#d28)). The time is
 /// enough for a bus on which a question takes 16 ms.
 const TORQUE_READ_CYCLES: u8 = 12;
 
@@ -121,13 +121,13 @@ impl BusScheduler {
         self.torque_due = true;
     }
 
-    /// Schedules torque, because the motor state changed, or an alarm has freed a joint.
+    /// Schedules torque, because the motor state changed or was written again, or an alarm has freed a joint.
     pub(crate) const fn torque_changed(&mut self) {
         self.torque_due = true;
     }
 
-    /// The time at which the next control cycle was due; `None` if it is not due yet. A late call repeats at most one
-    /// missed cycle: motion becomes late, not faster.
+    /// The time at which the next control cycle was due; `None` if it is not due yet. After a pause at most one missed
+    /// cycle is repeated: motion becomes late, not faster.
     pub(crate) fn cycle_due(&self, now: Instant) -> Option<Instant> {
         (now >= self.next_cycle).then(|| self.next_cycle.max(earlier(now, CYCLE)))
     }
@@ -145,7 +145,8 @@ impl BusScheduler {
         self.goals_due = self.goals_due.max(1);
     }
 
-    /// Prepares the next frame if one is due and the bus is free. Returns whether there is a frame to send.
+    /// Prepares the next frame if one is due and the bus is free. Returns whether there is a frame to send. Before a new
+    /// goal or torque, joints whose measurement is too old wait again ([`Joints::expire_pending`]).
     pub(crate) fn prepare_frame(
         &mut self,
         now: Instant,

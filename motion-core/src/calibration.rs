@@ -20,7 +20,7 @@ impl MicroDegrees {
     const PER_DEGREE: i32 = 1_000_000;
     const PER_CENTIDEGREE: i32 = 10_000;
 
-    /// This many whole degrees.
+    /// The angle of this many whole degrees.
     #[must_use]
     pub const fn from_degrees(degrees: u8) -> Self {
         // `as` widens here: `From` is not const.
@@ -42,7 +42,7 @@ impl MicroDegrees {
         u8::try_from(degrees).unwrap_or(180)
     }
 
-    /// This many hundredths of a degree.
+    /// The angle of this many hundredths of a degree.
     #[must_use]
     pub fn from_centidegrees(centidegrees: u16) -> Self {
         Self(i32::from(centidegrees) * Self::PER_CENTIDEGREE)
@@ -57,9 +57,9 @@ impl MicroDegrees {
     }
 }
 
-/// The highest position of a servo.
+/// The highest position of a servo, in counts.
 const MAX_COUNTS: i32 = 1023;
-/// Far above the highest velocity of a servo, 1757 counts per second, and in the range of the arithmetic.
+/// Limit on a servo's velocity, in counts per second: far above the highest one, 1757, and low enough for 32-bit products.
 const MAX_VELOCITY: i32 = 10_000;
 /// Thousandths of a degree in half a turn.
 const HALF_TURN: i32 = 180_000;
@@ -125,8 +125,7 @@ pub fn counts_from_angle(joint: Joint, angle: MicroDegrees, offset_degrees: i8) 
     u16::try_from(counts.clamp(0, MAX_COUNTS)).unwrap_or(0)
 }
 
-/// The angle of a joint whose servo is at `counts`, 0 to 1023; more counts as 1023. The angle may lie
-/// outside 0 to 180 degrees.
+/// The angle of a joint whose servo is at `counts`, limited to 1023. The angle may lie outside 0 to 180 degrees.
 #[must_use]
 pub fn angle_from_counts(joint: Joint, counts: u16, offset_degrees: i8) -> MicroDegrees {
     let mounting = Mounting::of(joint);
@@ -156,8 +155,8 @@ pub const fn load_from_servo(joint: Joint, load: i16) -> i16 {
 #[must_use]
 pub fn push_from_servo(joint: Joint, load: i16, speed: i16) -> i16 {
     let mounting = Mounting::of(joint);
-    // The load that the speed needs, in 0.1 % per count per second, times 1024: 1000 / 1757 or 1000 / 1292, the counts
-    // per second of 372 degrees/s.
+    // The load that the speed needs, in 0.1 % per count per second, times 1024: 1000 / 1757 or 1000 / 1292. 1757 and 1292
+    // counts per second are 372 degrees/s.
     let share = match mounting.scale {
         Scale::Counts850 => 583,
         Scale::Counts625 => 793,

@@ -73,14 +73,14 @@ impl Controller {
         self.arm.bus.servo_bytes(now, bytes);
     }
 
-    /// A byte from the servo bus was received damaged by `now`: with a framing error, noise or a parity error. Call it after
-    /// the bytes before it were taken. The answer that the byte belongs to fails.
+    /// A byte from the servo bus was received damaged by `now`: with a framing error, noise or a parity error. Call this after
+    /// the bytes before that byte were taken. The answer that the byte belongs to fails.
     pub fn servo_byte_damaged(&mut self, now: Instant) {
         self.arm.bus.servo_byte_damaged(now);
     }
 
-    /// A byte from the host was received damaged. Call it after the bytes before it were taken. No frame continues across
-    /// it: what is complete before it is executed, the rest is dropped.
+    /// A byte from the host was received damaged. Call this after the bytes before that byte were taken. No frame continues
+    /// across it: complete frames before it are executed, an incomplete one is dropped.
     pub fn host_byte_damaged(&mut self) {
         self.host.byte_damaged();
     }
@@ -90,7 +90,8 @@ impl Controller {
     /// ([D5](protocol_core::decisions#d5)). An idle link must take the longest frame, 262 bytes.
     pub fn poll(&mut self, now: Instant, host_room: usize) -> Output<'_> {
         self.arm.take_answers(now);
-        // Before the control cycle, so that its goals include new targets. Only a read that waits for room delays them.
+        // Before the control cycle, so that its goals include new targets. A read that waits for room, a save and an alarm
+        // delay the requests behind them.
         self.execute_requests(now, host_room);
         self.arm.advance(now);
         // The frame that results from an action of the watchdog is sent at once.
@@ -149,8 +150,8 @@ impl Controller {
         }
     }
 
-    /// Unless bytes come, the host cannot observe that `poll` is late before this time: when the next report is due, or
-    /// silence on the line has an effect. Each deadline before it still needs its own call.
+    /// When the next report is due, or silence on the line has an effect. Unless bytes come, the host cannot observe before
+    /// this time that `poll` is called late. A late shell still has to call `poll` for each deadline in between.
     #[must_use]
     pub fn host_deadline(&self) -> Instant {
         self.host.deadline()

@@ -11,7 +11,7 @@
 //! ```
 //!
 //! A waiting joint engages at its measured position. Its goal stays there until it has torque, so that the servo does
-//! not jump. A silent joint keeps its set-point, because the servo may still execute what it receives. This file does
+//! not jump. A silent joint keeps its set-point, because its servo may still hold there. This file does
 //! not know the bus or which joint it drives.
 
 use protocol_core::time::{Duration, Instant};
@@ -28,10 +28,11 @@ const REJOIN_WITHIN: MicroDegrees = MicroDegrees::from_degrees(3);
 enum Engagement {
     /// The joint is not driven.
     Released,
-    /// The joint will engage at the next measurement. The trajectory keeps a target that the host writes meanwhile.
+    /// The joint will engage at the next measurement. If the host writes a target meanwhile (`has_target`), the trajectory
+    /// keeps it.
     Waiting { has_target: bool },
-    /// The goal of the joint is its measured position, or its set-point if it was silent. It has no torque yet, unless
-    /// its servo kept it during the silence.
+    /// The goal of the joint is its measured position, or its set-point if the joint continues after a silence. The joint
+    /// has no torque yet, unless its servo kept the torque during the silence.
     TorquePending { was_silent: bool, has_new_target: bool },
     /// The joint has torque and follows its set-point.
     Engaged,
@@ -124,7 +125,8 @@ impl Drive {
     }
 
     /// Engages a joint that is at rest at `angle`. A waiting joint engages there. A silent joint continues from its
-    /// set-point if that is near, and engages at `angle` otherwise. Returns the target if the joint engaged.
+    /// set-point if that is near, and engages at `angle` otherwise. Returns which target the joint has; `None` if it does not
+    /// engage.
     pub fn engage(&mut self, angle: MicroDegrees) -> Option<Target> {
         let (Engagement::Waiting { has_target } | Engagement::Silent { has_new_target: has_target }) =
             self.engagement
@@ -159,7 +161,7 @@ impl Drive {
         };
     }
 
-    /// Is the joint engaged?
+    /// Is the joint engaged, so that its set-point may move?
     #[must_use]
     pub fn is_engaged(&self) -> bool {
         self.engagement == Engagement::Engaged
@@ -176,7 +178,7 @@ impl Drive {
         matches!(self.engagement, Engagement::Silent { .. })
     }
 
-    /// Records that the joint has torque. From now on its set-point may move.
+    /// Records that a joint whose torque was pending has torque. From now on its set-point may move.
     pub fn torque_is_on(&mut self) {
         if self.is_torque_pending() {
             self.engagement = Engagement::Engaged;
@@ -226,7 +228,7 @@ impl Drive {
         matches!(self.engagement, Engagement::TorquePending { .. })
     }
 
-    /// Has the set-point not reached the target, or is a target waiting?
+    /// Is the set-point still on its way to the target, or does a target wait until the joint engages?
     #[must_use]
     pub fn is_moving(&self) -> bool {
         match self.engagement {
@@ -251,7 +253,8 @@ impl Drive {
     }
 }
 
-/// Is a joint measured at `angle` so near to its set-point that it goes on from there ([D12](protocol_core::decisions#d12))?
+/// Is `angle` within 3 degrees of the set-point, so that a joint measured there continues its move
+/// ([D12](protocol_core::decisions#d12))?
 pub(crate) fn is_near(set_point: MicroDegrees, angle: MicroDegrees) -> bool {
     angle.0.abs_diff(set_point.0) <= REJOIN_WITHIN.0.unsigned_abs()
 }

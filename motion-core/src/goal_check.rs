@@ -1,4 +1,4 @@
-//! Does the servo of a joint that engages show the goal that was sent to it ([D12](protocol_core::decisions#d12))?
+//! Checks that the servo of a joint that engages shows the goal that was sent to it ([D12](protocol_core::decisions#d12)).
 //!
 //! ```text
 //!   goal sent ──▶ question ──▶ it shows the goal ──────────────────────────▶ torque
@@ -7,10 +7,10 @@
 //!       └── measured again, 10 ms later
 //! ```
 //!
-//! A frame of goals may be lost and the frame of torque behind it arrive: then the servo goes to an old goal. Some servos
+//! If a frame of goals is lost and the frame of torque behind it arrives, the servo goes to an old goal. Some servos
 //! may not show a new goal while their torque is off. So a servo that shows another goal three times gets the goal three
-//! times more directly before torque: a servo that does show its goal goes to an old one only if six frames in a row are
-//! lost, three of them at least 10 ms apart. This file does not know goals.
+//! more times, directly before torque. A servo that does show its goal then goes to an old one only if six frames in a row
+//! are lost, three of them at least 10 ms apart. This file does not know the value of a goal.
 
 /// A servo that has shown another goal this often counts as one that does not show goals.
 const HIDDEN_AFTER: u8 = 3;
@@ -21,7 +21,7 @@ const REPEATS: u8 = 3;
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct GoalCheck {
-    /// Successive answers that showed another goal, also of earlier engagements.
+    /// Successive answers that showed another goal, including answers of earlier engagements.
     misses: u8,
     /// The joint may get torque.
     is_done: bool,
@@ -44,20 +44,20 @@ impl GoalCheck {
         self.had_torque
     }
 
-    /// The joint may get torque: its servo shows the goal, or follows it already.
+    /// Records that the joint may get torque, because its servo shows the goal or has torque already.
     pub(crate) const fn shown(&mut self) {
         self.misses = 0;
         self.is_done = true;
     }
 
-    /// The servo shows another goal. Returns how often the goal has to be sent directly before torque; `None` if the
+    /// Records that the servo shows another goal. Returns how often the goal has to be sent directly before torque; `None` if the
     /// servo has to be asked again.
     pub(crate) fn hidden(&mut self) -> Option<u8> {
         self.misses = self.misses.saturating_add(1).min(HIDDEN_AFTER);
         (self.misses == HIDDEN_AFTER).then_some(REPEATS)
     }
 
-    /// The joint may get torque after its goal was sent again.
+    /// Records that the joint may get torque without a check of its new goal, which is sent directly before torque.
     pub(crate) const fn done(&mut self) {
         self.is_done = true;
     }

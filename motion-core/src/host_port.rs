@@ -88,7 +88,7 @@ impl HostPort {
         self.deframer.push(now, bytes)
     }
 
-    /// A damaged byte came behind all bytes so far.
+    /// Records that a damaged byte came after all bytes so far.
     pub(crate) fn byte_damaged(&mut self) {
         self.deframer.break_off();
     }
@@ -98,7 +98,8 @@ impl HostPort {
         self.deframer.wanted()
     }
 
-    /// The next event; `None` if there is none, or while a read waits for room.
+    /// The next write or defect; `None` if there is none, or once a read has its turn. The read then waits for room, and so
+    /// do the requests behind it.
     pub(crate) fn next_event(&mut self) -> Option<HostEvent<'_>> {
         if self.waiting_read.is_some() {
             return None;

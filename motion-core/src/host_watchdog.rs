@@ -15,7 +15,7 @@ pub(crate) struct HostWatchdog {
 }
 
 impl HostWatchdog {
-    /// No watchdog.
+    /// A watchdog that is switched off.
     pub(crate) const OFF: Self = Self { timeout: 0, due: Instant::FAR_FUTURE };
 
     /// Sets the longest silence, 0 to 255 times 10 ms, and begins to count at `now`. 0 switches the watchdog off.
@@ -25,7 +25,7 @@ impl HostWatchdog {
         self.heard(now);
     }
 
-    /// Ends a silence: a well-formed frame had its turn at `now`.
+    /// Ends a silence, because a well-formed frame had its turn at `now`.
     pub(crate) fn heard(&mut self, now: Instant) {
         if self.timeout > 0 {
             self.due = now + Duration::from_millis(u64::from(self.timeout) * 10);

@@ -51,23 +51,24 @@ pub(crate) struct JointState {
     pub(crate) position: PositionFilter,
     /// The target. Registers show it in degrees and in hundredths of a degree.
     target: MicroDegrees,
-    /// Where the joint was last measured; `None` until then.
+    /// Where the joint was last measured; `None` until its first measurement.
     measured: Option<MicroDegrees>,
-    /// As the servo measured it, in counts per second.
+    /// The velocity that the servo measured, in counts per second.
     servo_velocity: i16,
-    /// In 0.1 % of the stall torque, positive towards greater angles.
+    /// The load, in 0.1 % of the stall torque, positive towards greater angles.
     load: i16,
     obstacle: Obstacle,
     let_go: LetGo,
     torque: TorqueCheck,
     goal: GoalCheck,
-    /// The joint has not engaged since the controller started. Its servo may still hold a goal from before.
+    /// Since the controller started, the joint has not engaged, and the motor state has not changed. Its servo may still hold
+    /// a goal from before.
     is_first_engagement: bool,
     /// The last question to the servo was not answered.
     pub(crate) is_unanswered: bool,
     /// The error bits of the servo's last answer.
     pub(crate) alarms: u8,
-    /// In degrees Celsius; 0 while unknown.
+    /// The temperature of the servo, in degrees Celsius; 0 while unknown.
     pub(crate) temperature: u8,
 }
 
@@ -93,12 +94,12 @@ impl JointState {
         }
     }
 
-    /// The target.
+    /// The target that the registers show.
     pub(crate) const fn target(&self) -> MicroDegrees {
         self.target
     }
 
-    /// Where the joint stands, if its servo answers.
+    /// Where the joint was last measured; `None` while its servo is silent.
     pub(crate) fn known_angle(&self) -> Option<MicroDegrees> {
         self.measured.filter(|_| self.position.is_known())
     }
@@ -108,7 +109,7 @@ impl JointState {
         self.measured.is_some()
     }
 
-    /// Processes an answer. If `may_engage`, a waiting joint at rest engages.
+    /// Processes an answer. If `may_engage`, a waiting or silent joint at rest may engage.
     pub(crate) fn read(
         &mut self,
         now: Instant,
@@ -206,7 +207,7 @@ impl JointState {
         }
     }
 
-    /// Lets the target of a joint that is let go follow its position, unless the host wrote one.
+    /// Lets the target of a joint that is let go follow its position, unless the host wrote a target.
     fn follow(&mut self, now: Instant, answer: &Answer, angle: MicroDegrees, registers: &mut RegisterFile) {
         self.let_go.follow(now, answer);
         if registers.get(PROTECTION.address) != 0 && !self.drive.is_moving() {
@@ -214,14 +215,14 @@ impl JointState {
         }
     }
 
-    /// The servo holds no torque: the joint is let go ([D28](protocol_core::decisions#d28)).
+    /// Records that the servo holds no torque: the joint is let go ([D28](protocol_core::decisions#d28)).
     pub(crate) fn lose_torque(&mut self, now: Instant) {
         self.drive.lose_torque(false);
         self.obstacle.forget();
         self.let_go.let_go(now);
     }
 
-    /// The servo did not answer. Returns whether it counts as silent from now on.
+    /// Records that the servo did not answer. Returns whether the servo counts as silent from now on.
     pub(crate) fn failed(&mut self, now: Instant) -> bool {
         self.is_unanswered = true;
         if self.drive.has_set_point() {
@@ -234,17 +235,17 @@ impl JointState {
         fell_silent
     }
 
-    /// The servo may have restarted unnoticed: its torque is read before it is sent the next goal.
+    /// Records that the servo may have restarted unnoticed. Its torque switch is read before the next goal is sent to it.
     pub(crate) const fn doubt_torque(&mut self) {
         self.torque.doubt();
     }
 
-    /// Does the joint wait for torque while its servo answers?
+    /// Does the joint wait to engage, although its servo answered the last question?
     pub(crate) fn waits_and_answers(&self) -> bool {
         self.drive.is_waiting() && self.position.is_known() && !self.is_unanswered
     }
 
-    /// Is the joint sent goals? Not while it is doubtful whether its servo has restarted
+    /// Is the joint driven, and is it certain that its servo has not restarted? Only such a joint is sent goals
     /// ([D29](protocol_core::decisions#d29)).
     pub(crate) fn takes_goals(&self) -> bool {
         self.drive.is_driven() && self.torque.is_trusted()
@@ -266,8 +267,9 @@ impl JointState {
                 && (self.torque.is_urgent() || (is_refresh_near && !self.torque.is_fresh())))
     }
 
-    /// The torque for the servo in the servo state; `None` leaves its switch unchanged. Torque is refreshed only if a
-    /// read has shown it on since the last refresh, so that a servo that let go is not switched on.
+    /// The torque for the servo in motor state 1; `None` leaves its switch unchanged. A joint whose torque was pending is
+    /// engaged from now on if its goal check is done. Torque is refreshed only if a read has shown it on since the last
+    /// refresh, so that a servo that let go is not switched on.
     pub(crate) fn take_torque(&mut self, is_protected: bool) -> Option<Torque> {
         let is_on = if self.drive.is_torque_pending() {
             self.goal.is_done()
@@ -294,7 +296,7 @@ impl JointState {
         self.alarms = 0;
     }
 
-    /// Enters or leaves the servo state: forgets the obstacle, and that the joint was let go.
+    /// Enters or leaves motor state 1: forgets the obstacle, and that the joint was let go.
     pub(crate) fn set_driven(&mut self, is_driven: bool) {
         self.obstacle.forget();
         self.let_go = LetGo::NO;
@@ -302,7 +304,8 @@ impl JointState {
         if is_driven { self.drive.wait() } else { self.drive.release() }
     }
 
-    /// The host wrote the motor state: a joint that is let go may engage again ([D28](protocol_core::decisions#d28)).
+    /// Records that the host wrote the motor state: a joint that is let go may engage again
+    /// ([D28](protocol_core::decisions#d28)).
     pub(crate) const fn order(&mut self) {
         self.let_go.ordered();
     }

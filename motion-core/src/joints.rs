@@ -90,8 +90,8 @@ impl Joints {
         true
     }
 
-    /// The host wrote the motor state, perhaps the present one: joints that are let go may engage again
-    /// ([D28](protocol_core::decisions#d28)). Returns whether there is one.
+    /// Records that the host wrote the motor state, perhaps the present one: joints that are let go may engage again
+    /// ([D28](protocol_core::decisions#d28)). Returns whether any joint is let go.
     pub(crate) fn order(&mut self) -> bool {
         self.supply.ordered(self.joints.iter().any(|state| state.position.is_known()));
         self.joints.iter_mut().for_each(JointState::order);
@@ -104,7 +104,7 @@ impl Joints {
     }
 
     /// Starts the moves to the targets in a write that was applied, whose frame came at `now`. `period` is the set-point period
-    /// before it, in milliseconds.
+    /// before the write, in milliseconds.
     pub(crate) fn set_targets(
         &mut self,
         now: Instant,
@@ -162,7 +162,7 @@ impl Joints {
         }
     }
 
-    /// Processes an answer. If `may_engage`, a waiting joint at rest engages.
+    /// Processes an answer. If `may_engage`, a waiting or silent joint at rest may engage.
     pub(crate) fn measured(
         &mut self,
         now: Instant,
@@ -196,14 +196,14 @@ impl Joints {
         }
     }
 
-    /// Was the supply lost, now that the servo of this joint was found without torque ([D28](protocol_core::decisions#d28),
-    /// [D29](protocol_core::decisions#d29))?
+    /// Decides whether the supply was lost, after the servo of this joint was found without torque
+    /// ([D28](protocol_core::decisions#d28), [D29](protocol_core::decisions#d29)).
     fn is_supply_lost(&mut self, joint: Joint) -> bool {
         let others = self.driven() & !joint.bit();
         self.supply.is_lost(others != 0)
     }
 
-    /// The joints with a set-point.
+    /// The joints with a set-point, bit n-1 for joint n.
     #[inline(never)]
     fn driven(&self) -> u8 {
         self.set_of(|state| state.drive.has_set_point())
@@ -215,13 +215,14 @@ impl Joints {
         let fell_silent = state.failed(now);
         let mut driven = self.joints.iter().filter(|state| state.drive.has_set_point()).peekable();
         let are_driven_silent = driven.peek().is_some() && driven.all(|state| state.is_unanswered);
-        // A servo that answers has supply, also if its joint only waits for torque.
+        // A servo that answers has supply, even if its joint only waits to engage.
         let are_all_silent = are_driven_silent && !self.joints.iter().any(JointState::waits_and_answers);
         self.supply.unanswered(now, are_all_silent);
         fell_silent
     }
 
-    /// The last answer of this servo was processed late: it may have restarted since ([D29](protocol_core::decisions#d29)).
+    /// Records that the last answer of this servo was processed late: the servo may have restarted since
+    /// ([D29](protocol_core::decisions#d29)).
     pub(crate) fn doubt(&mut self, joint: Joint) {
         let engaged = self.joint_mut(joint).filter(|state| state.drive.is_engaged());
         engaged.into_iter().for_each(JointState::doubt_torque);

@@ -22,7 +22,8 @@ use crate::servo_bus::frame::error::{OVERHEAT, OVERLOAD};
 const FAR: u32 = 3_000_000;
 /// See [`FAR`].
 const FAR_FOR: Duration = Duration::from_millis(200);
-/// It also counts as freed if it has turned away from its set-point by this much since then, in millionths of a degree.
+/// Such a joint also counts as freed if it has turned away from its set-point by this much, in millionths of a degree. This
+/// counts from the nearest angle since the alarm.
 const TURNED_AWAY: i32 = 1_000_000;
 /// A joint engages anew when its alarm has been gone for this long or, after an overload, when it has been at rest for
 /// this long.
@@ -46,7 +47,7 @@ pub(crate) struct LetGo {
     attempts: [Option<Instant>; ATTEMPTS],
     /// The joint engaged too often. Only the host can make it engage again.
     is_exhausted: bool,
-    /// The host has ordered it to engage.
+    /// The host has ordered the joint to engage.
     is_ordered: bool,
 }
 
@@ -61,13 +62,13 @@ enum State {
         far_since: Option<Instant>,
     },
     LetGo {
-        /// All alarms since it was let go.
+        /// All alarms since the joint was let go.
         alarms: u8,
         /// The temperature when the servo became too hot, in degrees Celsius.
         hot_at: u8,
-        /// The last answer with an alarm that ends by itself.
+        /// When the last answer with an alarm that ends by itself came: any but an overload.
         alarm_at: Instant,
-        /// The last answer at which the joint was not at rest.
+        /// When the last answer came in which the joint was not at rest.
         moved_at: Instant,
         /// According to its last answer, an alarm keeps the servo from holding. A servo that was too hot holds again by
         /// itself when the alarm ends.
@@ -93,7 +94,7 @@ impl LetGo {
         matches!(self.state, State::LetGo { is_freed: true, .. }) && (is_protected || self.is_ordered)
     }
 
-    /// Torque-off is sent because of [`LetGo::needs_torque_off`].
+    /// Records that torque-off is sent, because of [`LetGo::needs_torque_off`].
     pub(crate) const fn torque_off_is_sent(&mut self) {
         if let State::LetGo { has_torque_off, .. } = &mut self.state {
             *has_torque_off = true;
@@ -138,7 +139,7 @@ impl LetGo {
         }
     }
 
-    /// The joint is let go from now on.
+    /// Records that the joint is let go from now on.
     pub(crate) fn let_go(&mut self, now: Instant) {
         self.state = State::LetGo {
             alarms: 0,
@@ -185,7 +186,7 @@ impl LetGo {
         is_calm && !self.is_exhausted && (is_protected || self.is_ordered)
     }
 
-    /// The joint engaged at `now`.
+    /// Records that the joint engaged at `now`. If it was let go, this counts as an attempt.
     pub(crate) fn engaged(&mut self, now: Instant) {
         if self.is_let_go() {
             let [first, second, _] = self.attempts;
@@ -194,7 +195,7 @@ impl LetGo {
         self.state = State::Holding;
     }
 
-    /// The host wrote the motor state: the joint may engage again, and the attempts count anew.
+    /// Records that the host wrote the motor state: the joint may engage again, and the attempts count anew.
     pub(crate) const fn ordered(&mut self) {
         self.attempts = [None; ATTEMPTS];
         self.is_exhausted = false;
@@ -222,8 +223,8 @@ mod tests {
         Answer { reading, alarms: VOLTAGE, torque: None, answer_micros: 0 }
     }
 
-    /// Is the joint freed at the last of these answers: time in milliseconds, angle and set-point in millionths of a
-    /// degree?
+    /// Returns whether the joint is freed at the last of these answers. Each has a time in milliseconds, and an angle and a
+    /// set-point in millionths of a degree.
     fn is_freed(answers: &[(u64, i32, i32)]) -> bool {
         let mut let_go = LetGo::NO;
         answers.iter().fold(false, |_, &(millis, angle, set_point)| {

@@ -11,7 +11,7 @@ use crate::calibration::MicroDegrees;
 use crate::limits::{claw_allows, linkage_allows};
 use crate::reach::Reached;
 
-/// The angle of each joint that the limits are checked with; `None` for a joint that has none.
+/// The angle of each joint, a target or a set-point, that the limits are checked with; `None` for a joint without one.
 pub(crate) type Angles = [Option<MicroDegrees>; JOINTS];
 
 /// A write that is to be checked.
@@ -20,7 +20,7 @@ pub(crate) struct LimitCheck<'a> {
     pub(crate) accepted: &'a Accepted<'a>,
     /// The targets that inverse kinematics finds for a position in the write ([M7](protocol_core::decisions#m7)).
     pub(crate) reached: &'a Reached,
-    /// The limits that are on before the write: [`LIMITS`].
+    /// The limits that are on before the write, as bits of [`LIMITS`].
     pub(crate) limits: u8,
 }
 
@@ -29,8 +29,8 @@ impl LimitCheck<'_> {
         self.accepted.value_at(LIMITS.address).unwrap_or(self.limits)
     }
 
-    /// The lowest register for which a limit refuses the write. `targets` are the targets before the write, and `set_points` the
-    /// set-points of the driven joints.
+    /// The lowest register for which a limit refuses the write; `None` if no limit does. `targets` are the targets before the
+    /// write, and `set_points` the set-points of the driven joints.
     pub(crate) fn first_refused(&self, targets: &Angles, set_points: &Angles) -> Option<u8> {
         let mut after = *targets;
         for (target, joint) in after.iter_mut().zip(Joint::ALL) {
@@ -58,7 +58,7 @@ impl LimitCheck<'_> {
         first_written.filter(|_| !targets_keep)
     }
 
-    /// The target of a joint in the write. The last of several counts.
+    /// The target of a joint in the write. If there are several, the last one counts.
     fn written(&self, joint: Joint) -> Option<MicroDegrees> {
         let coarse = || self.accepted.value_at(TARGET_POSITION.of(joint)).map(MicroDegrees::from_degrees);
         let fine = || self.accepted.word_at(FINE_TARGET.of(joint)).map(MicroDegrees::from_centidegrees);
@@ -74,7 +74,7 @@ impl LimitCheck<'_> {
     }
 }
 
-/// A limit is kept where an angle is missing.
+/// Do joints 2 and 3 keep the linkage? They do if the angle of one is missing.
 fn linkage_is_kept(angles: &Angles) -> bool {
     let [_, two, three, ..] = *angles;
     two.zip(three).is_none_or(|(two, three)| linkage_allows(two, three))

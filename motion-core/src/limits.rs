@@ -26,8 +26,8 @@ pub const fn claw_allows(seven: MicroDegrees) -> bool {
     seven.0 <= CLAW_MAX.0
 }
 
-/// The set-points of joints 2 and 3 after a step. The part of a step that would break the linkage is left out: that
-/// joint waits. Outside the limits, only steps inwards are allowed.
+/// The set-points of joints 2 and 3 after a step. The part of a joint's step that would break the linkage is left
+/// out: the joint waits. Outside the limits, only steps inwards are allowed.
 #[must_use]
 pub fn linkage_step(before: [MicroDegrees; 2], after: [MicroDegrees; 2]) -> [MicroDegrees; 2] {
     let (min, max) = LINKAGE_SUM;

@@ -4,7 +4,7 @@ use protocol_core::registers::map::motor_state;
 
 use crate::servo_bus::Torque;
 
-/// Register 29.
+/// The motor state, the value of register 29.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -28,7 +28,7 @@ impl MotorState {
         }
     }
 
-    /// The torque of every joint; `None` in the servo state, where each joint decides.
+    /// The torque of every joint; `None` in state 1, where it differs from joint to joint.
     #[must_use]
     pub const fn torque(self) -> Option<Torque> {
         match self {

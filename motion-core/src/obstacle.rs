@@ -12,8 +12,8 @@ use crate::push_limiter::{PushLimit, PushLimiter, PushSample};
 const BLOCKED_AFTER: Duration = Duration::from_millis(1_000);
 /// [`BLOCKED_AFTER`] in control cycles of 10 ms.
 const BLOCKED_AFTER_CYCLES: u8 = 100;
-/// A joint has moved if it came nearer to its target by more than this, in millionths of a degree. One count is 0.29
-/// degrees for joints 5 to 7.
+/// A joint counts as nearer to its target only if its distance became smaller by more than this, in millionths of a degree.
+/// One count is 0.29 degrees for joints 5 to 7.
 const NEARER_BY: u32 = 300_000;
 
 /// A set-point that an obstacle holds back.
@@ -60,7 +60,7 @@ impl Obstacle {
         self.held.is_some()
     }
 
-    /// Is the joint blocked?
+    /// Is the joint blocked, so that register 195 shows its bit?
     pub(crate) const fn is_blocked(&self) -> bool {
         self.is_blocked
     }
@@ -77,18 +77,19 @@ impl Obstacle {
         self.limiter.measured(now, sample, set_point, limit) && self.is_holding_back()
     }
 
-    /// The host wrote a target: the joint tries again.
+    /// Records that the host wrote a target: the joint tries again.
     pub(crate) const fn target_written(&mut self) {
         (self.held, self.is_blocked, self.retrying_since) = (None, false, None);
     }
 
-    /// The host wrote a point of a stream at `now`: a blocked joint tries again, and counts as blocked until it is free.
+    /// Records that the host wrote a point of a stream at `now`: a blocked joint tries again, and counts as blocked until it
+    /// is free.
     pub(crate) fn point_written(&mut self, now: Instant) {
         self.retrying_since = self.is_blocked.then_some(now);
     }
 
-    /// Checks the set-point of the control cycle that ends at `end`, of a joint measured at `angle`. Returns what becomes of
-    /// the set-point if it is held back.
+    /// Checks the set-point of the control cycle that ends at `end`, of a joint measured at `angle`. If the set-point is
+    /// held back, returns the one that replaces it.
     pub(crate) fn hold_back(
         &mut self,
         end: Instant,

@@ -17,10 +17,10 @@ use crate::calibration::MicroDegrees;
 
 /// A stream needs three points; one more may be due within the present control cycle.
 const CAPACITY: usize = 4;
-/// A frame shifts the grid by 1/16 of the distance between the grid and the time that the frame asks for.
+/// A frame shifts the grid by 1/16 of the distance between the grid and the time one and a half periods after the frame.
 const SHIFT_DIVISOR: u64 = 16;
 
-/// If a frame comes later than 1/8 of a period after the previous point was due, a frame between them was lost.
+/// If a frame comes later than 1/8 of a period after the newest point was due, the frame before it counts as lost.
 const LATE_DIVISOR: u64 = 8;
 
 /// A point of a stream.
@@ -87,8 +87,7 @@ impl PointStream {
         latest.min(earlier(slot + late, early))
     }
 
-    /// The point where a joint that was at `from` one control cycle before `end` should be at `end`. Points that are due by
-    /// then are passed.
+    /// The angle at `end` for a joint that was at `from` one control cycle earlier. Removes the points that are due by `end`.
     pub fn follow(&mut self, from: MicroDegrees, end: Instant) -> MicroDegrees {
         let (mut angle, mut time) = (from, earlier(end, CYCLE));
         while let Some(next) = self.points.first() {

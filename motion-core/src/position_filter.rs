@@ -2,8 +2,9 @@
 //!
 //! The checksum has eight bits, so one damaged answer in 256 passes it. A position is therefore accepted only if it is
 //! within reach of the previous answer: as far as the motor can turn in the time between. A single outlier is rejected.
-//! A joint that was moved meanwhile is accepted at the second answer. Older answers reject outliers less reliably, so a
-//! joint is given torque only after two nearly equal answers. This file does not know angles or frames.
+//! The position of a joint that was moved meanwhile is accepted at the second answer. The older the previous answer, the less
+//! reliably an outlier is rejected, so a joint is given torque only after two nearly equal answers. This file does not know
+//! angles or frames.
 
 use core::ops::RangeInclusive;
 
@@ -21,10 +22,10 @@ const FRESH_FOR: Duration = Duration::from_millis(20);
 /// The highest speed of a joint: 372 degrees/s ([D10](protocol_core::decisions#d10)) are 1757 counts per second. A hand can
 /// be slightly faster.
 const COUNTS_PER_SECOND: u32 = 2_000;
-/// A joint that sinks this slowly counts as steady: otherwise a servo that is seldom read would engage only when its joint lies at
-/// the bottom.
+/// A joint that sinks this slowly counts as steady. Otherwise a joint whose servo is seldom read would engage only when it lies
+/// at the bottom.
 const SINKING_COUNTS_PER_SECOND: u32 = 60;
-/// The allowance for sinking grows up to this age of a reading, to 15 counts.
+/// The allowance for sinking grows with the time between two answers, up to this time, where it is 15 counts.
 const SINKS_FOR_MILLIS: u32 = 250;
 /// After a longer pause, a false position may be within reach of the previous answer and yet so far away that a joint
 /// whose set-point follows it would jump.
@@ -77,7 +78,8 @@ impl PositionFilter {
         ask_again_at: Instant::ZERO,
     };
 
-    /// Filters the position that the servo answered at `now`. It measured it in the last `answer_micros` microseconds.
+    /// Filters the position that the servo answered at `now`. The servo measured the position in the `answer_micros`
+    /// microseconds before.
     pub fn answered(&mut self, now: Instant, answer_micros: u16, counts: u16) -> FilterOutcome {
         let (distance, millis) = self.last.map_or((u32::MAX, 0), |(last, then)| {
             (u32::from(last.abs_diff(counts)), at_most_a_second(now - then))
@@ -130,9 +132,9 @@ impl PositionFilter {
         self.is_steady
     }
 
-    /// Did the position jump across a long pause, although `speed` does not explain it? `speed` is from the last
-    /// answer, in counts per second; it may be too low, or higher than a joint can turn. Then the answer may be
-    /// damaged.
+    /// Did the position jump across a long pause, although `speed` does not explain the jump? Then the answer may be damaged.
+    /// `speed` is from the last answer, in counts per second. A speed that is too low, or higher than a joint can turn,
+    /// explains no jump.
     #[must_use]
     pub fn is_doubtful(&self, speed: i16) -> bool {
         self.is_jump && !TURNING.contains(&speed.unsigned_abs())
@@ -157,9 +159,9 @@ impl PositionFilter {
     }
 }
 
-/// Whole milliseconds. After a second every position is within reach.
+/// Whole milliseconds, at most 1,000: after a second every position is within reach.
 fn at_most_a_second(time: Duration) -> u32 {
-    // 32 bits are enough then, and the chip divides them in hardware.
+    // 32 bits are enough for a second, and the chip divides them in hardware.
     u32::try_from(time.as_micros()).unwrap_or(u32::MAX).min(1_000_000) / 1_000
 }
 

@@ -20,9 +20,9 @@ use crate::calibration::MicroDegrees;
 /// The limit of a joint's push.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PushLimit {
-    /// Of a joint that carries the arm, in 0.1 % of the stall torque.
+    /// The limit of a joint that carries the arm, in 0.1 % of the stall torque.
     Arm(i16),
-    /// Of the claw, in 0.1 % of the stall torque. It carries no load, but may break what it holds.
+    /// The limit of the claw, in 0.1 % of the stall torque. The claw carries no load, but may break what it holds.
     Grip(i16),
 }
 
@@ -44,9 +44,9 @@ impl PushLimit {
     }
 }
 
-/// A joint that turns by at most one count is at a standstill: 0.29 degrees of joints 5 to 7.
+/// A joint that turns by at most one count is at a standstill: 0.29 degrees of joints 5 to 7. In millionths of a degree.
 const STANDSTILL: u32 = 300_000;
-/// The assumed distance of the goal at which a servo just gives its full load. It bounds the distance as long as the servo is
+/// The assumed distance of the goal from which on a servo gives its full load. It bounds the distance as long as the servo is
 /// at full load: 4.3 degrees, as arm-sim assumes.
 const FULL_LOAD_DISTANCE: i32 = 4_300_000;
 /// A servo with this load or more, in 0.1 %, may be at full load.
@@ -60,15 +60,15 @@ const SINK_PER_MILLISECOND: i32 = 8_000;
 /// The distance may grow again when the push is this far under the limit; with a limit under twice this, when the push
 /// is under half the limit.
 const SLACK: i16 = 100;
-/// The growth of the distance after each average.
+/// The growth of the distance after each average, in millionths of a degree.
 const GROWTH: i32 = 100_000;
-/// Measurements in an average. The push follows a new goal after two of them.
+/// Measurements in an average. The push follows a new goal after two measurements.
 const AVERAGED: i16 = 3;
 
-/// What a servo measured.
+/// A measurement of a joint, as its limiter needs it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PushSample {
-    /// The position.
+    /// The measured position of the joint.
     pub angle: MicroDegrees,
     /// The load less what the speed needs, in 0.1 % of the stall torque.
     pub push: i16,
@@ -90,7 +90,7 @@ enum Phase {
     /// The push is over the limit.
     Over {
         since: Instant,
-        /// The joint has not turned since this time, from this angle.
+        /// Since when the joint stands still, and its angle then.
         still: (Instant, MicroDegrees),
         is_positive: bool,
     },
@@ -102,14 +102,14 @@ enum Phase {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Bound {
     is_positive: bool,
-    /// The allowed distance between measured position and set-point.
+    /// The allowed distance between measured position and set-point, in millionths of a degree.
     distance: i32,
     set_point: MicroDegrees,
     measured_at: Instant,
     /// The sum and the number of the pushes in the present average.
     sum: i32,
     samples: i16,
-    /// A servo at full load gave one of these pushes.
+    /// The servo may have been at full load in one of these measurements.
     any_saturated: bool,
     /// The push is over the tolerance, so the bound follows the measured position at once.
     is_urgent: bool,
@@ -122,7 +122,7 @@ impl PushLimiter {
     pub const FREE: Self = Self { phase: Phase::Free };
 
     /// Takes a measurement of a driven joint. Returns whether the joint is limited, and has turned past `set_point` in
-    /// the direction of its push. Then nothing stops the joint, and this set-point would turn it back.
+    /// the direction of its push. Then no obstacle stops the joint, and the servo would turn it back to this set-point.
     #[inline]
     pub fn measured(
         &mut self,
@@ -144,7 +144,7 @@ impl PushLimiter {
         if bound.is_positive { angle > set_point } else { angle < set_point }
     }
 
-    // Not inlined: few measurements call it, but with it inlined all would save its CPU registers.
+    // Not inlined: few measurements call it, but if it were inlined, all would save the CPU registers that it uses.
     #[inline(never)]
     fn follow(&mut self, now: Instant, sample: PushSample, set_point: MicroDegrees, limit: PushLimit) {
         let [grace, grace_at_standstill] = limit.grace();
@@ -213,7 +213,8 @@ impl Bound {
         bound
     }
 
-    /// Returns whether the joint still has to be limited.
+    /// Takes a measurement: adapts the distance after each average, and moves the bound. Returns whether the joint still has
+    /// to be limited.
     fn measured(&mut self, now: Instant, sample: PushSample, limit: i16) -> bool {
         self.sum += i32::from(directed(sample.push, self.is_positive));
         self.samples += 1;
@@ -262,12 +263,13 @@ fn scaled(distance: i32, limit: i16, push: i16) -> i32 {
     (distance / i32::from(push.max(1))).saturating_mul(limit.into())
 }
 
-/// A push, positive in this direction.
+/// A push with its sign changed unless `is_positive`, so that it counts in the direction of the bound.
 const fn directed(push: i16, is_positive: bool) -> i16 {
     if is_positive { push } else { push.saturating_neg() }
 }
 
-/// An angle, positive in this direction.
+/// An angle with its sign changed unless `is_positive`, so that it counts in the direction of the bound. Applied again, the
+/// function gives the angle back.
 const fn directed_angle(angle: i32, is_positive: bool) -> i32 {
     if is_positive { angle } else { angle.saturating_neg() }
 }

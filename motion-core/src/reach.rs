@@ -17,7 +17,7 @@ use protocol_core::request::Alarm;
 
 use crate::calibration::MicroDegrees;
 
-/// The targets of the joints that reach the positions in a write.
+/// The joint targets with which the arm reaches the positions in a write.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Reached {
     /// `None` for a joint that keeps its target.
@@ -30,7 +30,7 @@ impl Reached {
     /// A write without positions.
     pub(crate) const NONE: Self = Self { targets: [None; JOINTS], address: 0 };
 
-    /// The target of one joint.
+    /// The target of one joint; `None` if the joint keeps its target.
     pub(crate) fn target(&self, joint: Joint) -> Option<MicroDegrees> {
         self.targets.get(usize::from(joint.index())).copied().flatten()
     }
@@ -43,7 +43,7 @@ impl Reached {
     }
 }
 
-/// No joint angles reach a position in a write.
+/// A position in a write that no joint angles reach.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct OutOfReach {
     /// The first register of the block.
@@ -58,7 +58,7 @@ impl OutOfReach {
     }
 }
 
-/// Do joint angles exist for all positions in a write? The arm refuses the write otherwise
+/// Returns whether there are joint angles for all positions in a write. If not, the arm refuses the write
 /// ([M7](protocol_core::decisions#m7)).
 #[must_use]
 pub fn is_within(accepted: &Accepted<'_>) -> bool {

@@ -45,7 +45,7 @@ impl ReportTimer {
     }
 
     /// Returns whether a report is due, once for each report. A call that is late by a period or more skips the missed
-    /// reports; the next report is due one period later.
+    /// reports; the next report is due one period after the call.
     pub fn poll_due(&mut self, now: Instant) -> bool {
         if self.due > now {
             return false;

@@ -62,7 +62,7 @@ impl Reports {
         self.due
     }
 
-    /// The report that is due, once for each report.
+    /// The kind of the report that is due, once for each report; `None` if none is due.
     pub(crate) fn poll_due(&mut self, now: Instant) -> Option<ReportKind> {
         if self.due > now {
             return None;
@@ -107,7 +107,7 @@ mod tests {
         registers
     }
 
-    /// How many reports of each kind there are in a second.
+    /// How many reports of positions, angles and loads there are in a second.
     fn in_a_second(registers: &RegisterFile, baud: u32) -> [usize; 3] {
         let mut reports = Reports::OFF;
         reports.set(at(0), registers, baud);

@@ -17,11 +17,11 @@ const CONFIRMED_BY: u8 = 2;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 enum Known {
-    /// It was ordered on, and not read since.
+    /// The switch was ordered on, and not read as on since.
     Ordered,
-    /// The last read showed it on.
+    /// The last read that is trusted showed the switch on.
     On,
-    /// A question was not answered since it was read, or the servo was not heard for long.
+    /// A question was not answered since the switch was read, or the servo was not heard for long.
     Doubtful,
 }
 
@@ -43,7 +43,7 @@ pub(crate) struct TorqueCheck {
     known: Known,
     /// Successive answers that say off.
     offs: u8,
-    /// A read has shown it on since torque was last refreshed.
+    /// A read has shown the switch on since torque was last refreshed.
     is_fresh: bool,
 }
 
@@ -51,19 +51,19 @@ impl TorqueCheck {
     /// Torque is to be switched on.
     pub(crate) const ORDERED: Self = Self { known: Known::Ordered, offs: 0, is_fresh: false };
 
-    /// A question was not answered. The count of answers that say off goes on, because some servos answer only every
+    /// Records that a question was not answered. The count of answers that say off goes on, because some servos answer only every
     /// second question.
     pub(crate) const fn unanswered(&mut self) {
         self.doubt();
     }
 
-    /// The switch may have gone off unnoticed, although no question was lost.
+    /// Records that the switch may have gone off unnoticed.
     pub(crate) const fn doubt(&mut self) {
         self.known = Known::Doubtful;
         self.is_fresh = false;
     }
 
-    /// Takes what an answer says.
+    /// Takes the state of the switch from an answer; `None` if the answer does not hold it.
     pub(crate) fn answered(&mut self, has_torque: Option<bool>) -> TorqueFound {
         match has_torque {
             None => TorqueFound::AsBefore,
@@ -98,7 +98,7 @@ impl TorqueCheck {
         self.is_fresh
     }
 
-    /// Torque is refreshed.
+    /// Records that torque is refreshed.
     pub(crate) const fn refreshed(&mut self) {
         self.is_fresh = false;
     }

@@ -11,10 +11,11 @@ use crate::point_stream::PointStream;
 
 /// Control cycles in one unit of the time registers: 100 ms at 100 Hz.
 const CYCLES_PER_TIME_UNIT: u16 = 10;
-/// Step of one control cycle for each unit of the speed registers: 1.9 degrees/s at 100 Hz
+/// Step of one control cycle for each unit of the speed registers, in millionths of a degree: 1.9 degrees/s at 100 Hz
 /// ([D10](protocol_core::decisions#d10)).
 const STEP_PER_SPEED_UNIT: i32 = 19_000;
-/// Step of one control cycle at the motor's maximum: 62 rpm are 372 degrees/s ([D10](protocol_core::decisions#d10)).
+/// Step of one control cycle at the motor's maximum, in millionths of a degree: 62 rpm are 372 degrees/s
+/// ([D10](protocol_core::decisions#d10)).
 const LARGEST_STEP: i32 = 3_720_000;
 
 /// The set-point of one joint and its target.
@@ -22,9 +23,9 @@ const LARGEST_STEP: i32 = 3_720_000;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Trajectory {
     set_point: MicroDegrees,
-    /// In a stream: its newest point.
+    /// The target; in a stream its newest point.
     target: MicroDegrees,
-    /// Remaining cycles of a timed move, at least 1; 0 is the motor's maximum speed.
+    /// Remaining cycles of a timed move, at least 1; 0 for a move without a time.
     cycles_left: u16,
     stream: PointStream,
 }
@@ -48,7 +49,7 @@ impl Trajectory {
         self.target
     }
 
-    /// Has the set-point not reached the target yet?
+    /// Is the set-point still on its way to the target?
     #[must_use]
     pub fn is_moving(&self) -> bool {
         self.set_point != self.target
@@ -93,7 +94,8 @@ impl Trajectory {
         }
     }
 
-    /// A joint that cannot keep up with its stream goes towards the newest point.
+    /// Advances the set-point along the stream by at most `most`. If that is too slow, the set-point goes towards the newest
+    /// point.
     fn advance_stream(&mut self, end: Instant, most: i32) {
         let mut wanted = self.stream.follow(self.set_point, end);
         if self.set_point.0.abs_diff(wanted.0) > most.unsigned_abs() {
@@ -108,7 +110,7 @@ impl Trajectory {
         self.set_point.0 += distance.min(most).max(-most);
     }
 
-    /// Moves the set-point at once to `angle`, where the joint is already, if that is on the way to the target.
+    /// Moves the set-point at once to `angle`, where the joint is already, as far as that is on the way to the target.
     pub fn catch_up(&mut self, angle: MicroDegrees) {
         let [low, high] = [self.set_point.min(self.target), self.set_point.max(self.target)];
         self.set_point = angle.max(low).min(high);

@@ -33,8 +33,8 @@ impl Default for VacuumControl {
 }
 
 impl VacuumControl {
-    /// Sets register 31: suck or release. A repeated release has no effect, so that a host cannot keep the valve open by
-    /// repeating it.
+    /// Executes a write of register 31: suck or release. A repeated release has no effect, so that a host cannot keep the valve
+    /// open by repeating it.
     pub fn set(&mut self, now: Instant, suck: bool) {
         if suck {
             self.wanted = Vacuum { pump: true, valve: false };
@@ -57,7 +57,7 @@ impl VacuumControl {
         })
     }
 
-    /// When the valve closes.
+    /// When the valve closes; [`Instant::FAR_FUTURE`] if it is closed.
     #[must_use]
     pub const fn deadline(&self) -> Instant {
         self.close_valve_at

@@ -9,8 +9,8 @@ const MASK: u64 = (1 << 48) - 1;
 /// to the chip id, most significant byte first.
 ///
 /// The chip id is the remainder modulo a polynomial of degree 48. Two unique ids that differ only within 48 consecutive
-/// bits have different chip ids. Chips of one lot differ in the first 40 bits: position on the wafer and wafer number. Any
-/// two other chips collide with a probability of 2^-48.
+/// bits have different chip ids. So have chips of one lot, whose unique ids differ only in the first 40 bits (position on the
+/// wafer, wafer number). Any two other chips collide with a probability of 2^-48.
 #[must_use]
 pub fn reduce(unique_id: [u8; 12]) -> [u8; 6] {
     let mut remainder: u64 = 0;
@@ -35,7 +35,7 @@ mod tests {
         assert_eq!(reduce(*b"\x33\x00\x25\x00\x0c\x51\x34\x36\x33\x32\x36\x36"), GOLDEN);
     }
 
-    /// Calculated with a separate program (long division over GF(2)). Released arms use it, so it must not change.
+    /// Calculated with a separate program (long division over GF(2)). A change would give released arms another chip id.
     const GOLDEN: [u8; 6] = [0xAB, 0x46, 0xDB, 0xA5, 0x94, 0x95];
 
     #[test]

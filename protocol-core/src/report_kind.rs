@@ -3,7 +3,7 @@
 use crate::registers::map::{FINE_POSITION, LOAD, PRESENT_POSITION, report_content};
 use crate::registers::map21::{Map, PRESENT_ANGLE, PRESENT_LOAD};
 
-/// What a report holds. Each kind is a stream of its own.
+/// What a report holds. The reports of one kind form one stream.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum ReportKind {
@@ -20,17 +20,17 @@ pub enum ReportKind {
 }
 
 impl ReportKind {
-    /// All kinds.
+    /// All kinds, in the order of [`ReportKind::index`].
     pub const ALL: [Self; 5] =
         [Self::Positions, Self::FinePositions, Self::FineState, Self::Angles, Self::Loads];
 
-    /// Its place in [`ReportKind::ALL`].
+    /// The index of this kind in [`ReportKind::ALL`], 0 to 4.
     #[must_use]
     pub const fn index(self) -> usize {
         self as usize
     }
 
-    /// The kind for a value of register 189 ([D26](crate::decisions#d26)).
+    /// The kind for a value of register 189 ([D26](crate::decisions#d26)). Values above 2 count as 0.
     #[must_use]
     pub const fn of_content(content: u8) -> Self {
         match content {
@@ -55,7 +55,7 @@ impl ReportKind {
         (row.address, row.count)
     }
 
-    /// The map whose form the report has.
+    /// The map that defines the frame of the report.
     #[must_use]
     pub const fn map(self) -> Map {
         match self {

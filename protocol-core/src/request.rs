@@ -7,7 +7,7 @@
 //!   Report, Alarm     ◀── Frame ◀── without a request
 //! ```
 //!
-//! This file does not know the meaning of registers, or streams.
+//! This file knows neither streams of bytes nor the meaning of registers.
 
 use crate::wire::frame::{self, Frame, FrameBuffer, Function};
 
@@ -101,7 +101,7 @@ pub struct Report<'a> {
 }
 
 impl<'a> Report<'a> {
-    /// The report in a frame that the host received; `None` for any other frame.
+    /// The report of map 2.1 in a frame that the host received; `None` for any other frame, also for a report of map 2.2.
     #[must_use]
     pub const fn from_frame(frame: Frame<'a>) -> Option<Self> {
         match frame.function {
@@ -129,7 +129,7 @@ pub struct Alarm {
 }
 
 impl Alarm {
-    /// A position that joint angles do not reach. `kind` is 5, 6 or 7.
+    /// The warning that no joint angles reach a position. `kind` is 5, 6 or 7.
     #[must_use]
     pub const fn out_of_reach(kind: u8) -> Self {
         Self { level: 1, kind }

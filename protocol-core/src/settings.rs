@@ -52,7 +52,7 @@ impl<F: NorFlash> Settings<F> {
         &self.opened
     }
 
-    /// The settings that the journal held at start, if any.
+    /// The settings that the journal held at start or at the last [`Settings::reopen`], if any.
     #[must_use]
     pub const fn found(&self) -> Option<&Image> {
         self.opened.image()

@@ -10,7 +10,7 @@ use crate::wait::wait_for;
 const REFERENCE: u8 = 17;
 /// Start-up time: the reference needs 10 microseconds, the converter 3 (DS8626).
 const START_UP_MICROS: u32 = 20;
-/// Polls until the conversion is done. It takes 24 microseconds.
+/// Limit on the polls for the end of the conversion, which takes 24 microseconds.
 const DONE_POLLS: u32 = 10_000;
 
 /// The factory's reading of the internal reference at 3.3 V (DS8626); `None` in the emulator.

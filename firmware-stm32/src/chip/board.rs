@@ -61,7 +61,7 @@ const _: () = assert!(
     "with this SERVO_BAUD the servos' answers come after SERVO_TIMEOUT"
 );
 
-/// Bytes of the longest answer of a servo: torque switch to measurements.
+/// Bytes of the longest answer of a servo: the registers from the torque switch to the measurements.
 const LONGEST_ANSWER: u32 = 33;
 /// Timeout in the emulator, where bytes are late on a busy machine.
 pub const SERVO_TIMEOUT_EMULATED: Duration = Duration::from_millis(50);
@@ -90,7 +90,7 @@ pub const SAVE_TIMEOUT_MICROS: u32 = 5_000;
 /// The chip id in the emulator.
 pub const CHIP_ID_EMULATED: [u8; 6] = *b"\x7B\x07\x00\x00\x00\x01";
 
-/// The id of this chip ([D8](protocol_core::decisions#d8)).
+/// The chip id, registers 2 to 7 ([D8](protocol_core::decisions#d8)).
 pub fn chip_id(source: ClockSource) -> [u8; 6] {
     match source {
         ClockSource::Emulated => CHIP_ID_EMULATED,

@@ -24,17 +24,18 @@ use crate::tick;
 use crate::timeline::Timeline;
 use crate::wait::wait_for;
 
-/// Polls until a clock is ready: some 0.1 s, as the core runs on the internal oscillator meanwhile. A crystal takes a few
-/// milliseconds (DS8626, table 33).
+/// Limit on the polls for a clock to become ready: some 0.1 s, because the core runs on the internal oscillator meanwhile.
+/// A crystal takes a few milliseconds (DS8626, table 33).
 const READY_POLLS: u32 = 200_000;
-/// Polls until a capture of the crystal. With the slowest, 4 MHz, it takes 62 us: 1,000 cycles of the core.
+/// Limit on the polls for a capture of the crystal. With the slowest crystal, 4 MHz, a capture takes 62 us: 1,000 cycles of
+/// the core.
 const CAPTURE_POLLS: u32 = 2_000;
 /// Frequency of the internal oscillator, in MHz.
 const INTERNAL_MHZ: u8 = 16;
 
 const _: () = assert!(clock_rates::INTERNAL_HZ == INTERNAL_MHZ as u32 * 1_000_000);
 
-/// What [`start`] found.
+/// The result of [`start`].
 #[derive(Clone, Copy)]
 pub struct StartedClock {
     /// The source of the core clock.
@@ -43,7 +44,8 @@ pub struct StartedClock {
     pub crystal_khz: Option<u32>,
 }
 
-/// Starts the best clock that works. After a reset the chip runs on its internal oscillator.
+/// Starts the best clock that works, and keeps the debug port clocked while the core sleeps. After a reset the chip runs on
+/// its internal oscillator.
 pub fn start(rcc: &pac::RCC, flash: &pac::FLASH, dbgmcu: &pac::DBGMCU, timer: &pac::TIM11) -> StartedClock {
     // Without DBG_SLEEP, WFI also stops the clock of the debug port, and no probe can attach to a sleeping chip
     // (RM0090, DBGMCU_CR). A probe clears the bit when it detaches; a reset does not.
@@ -78,7 +80,7 @@ fn select(rcc: &pac::RCC, flash: &pac::FLASH, crystal_mhz: Option<u8>) -> ClockS
 }
 
 /// Measures the crystal with TIM11, in kHz. The internal oscillator clocks the core and the timer meanwhile (RM0090, section
-/// 7.2.11). `None` if no signal arrives.
+/// 7.2.11). `None` if a capture does not come in time, or if one was missed.
 fn measure_crystal(rcc: &pac::RCC, timer: &pac::TIM11) -> Option<u32> {
     // SAFETY: 31 is the largest of the dividers 2 to 31 (RM0090, RCC_CFGR).
     rcc.cfgr().modify(|_, w| unsafe { w.rtcpre().bits(crystal::DIVIDER) });
@@ -116,7 +118,7 @@ fn is_emulated(rcc: &pac::RCC, dbgmcu: &pac::DBGMCU) -> bool {
 }
 
 /// Locks the PLL at 1 MHz x 336 / 2 = 168 MHz. Returns false if it does not lock. An input of 1 MHz serves every crystal of
-/// whole megahertz; with the 2 MHz that RM0090 recommends there would be less jitter, and no 25 MHz.
+/// whole megahertz; the 2 MHz that RM0090 recommends would give less jitter, but exclude a crystal of 25 MHz.
 fn lock_pll(rcc: &pac::RCC, input_mhz: u8, from_crystal: bool) -> bool {
     rcc.cr().modify(|_, w| w.pllon().off());
     if !wait_for(READY_POLLS, || rcc.cr().read().pllrdy().is_not_ready()) {
@@ -174,7 +176,7 @@ impl Clock {
     /// Starts TIM2 and the system timer.
     pub fn start(timer: &pac::TIM2, mut ticker: SYST, rates: ClockRates) -> Self {
         timer.psc().write(|w| w.psc().set(clock_rates::microsecond_prescaler(rates.timer)));
-        // The manual gives 0 after a reset (RM0090, section 18.4.12), with which the counter stands still.
+        // After a reset ARR is 0 according to the manual (RM0090, section 18.4.12), and the counter would stand still.
         timer.arr().write(|w| w.arr().set(u32::MAX));
         // An update event loads the prescaler and clears the count.
         timer.egr().write(|w| w.ug().update());

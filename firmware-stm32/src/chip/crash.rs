@@ -1,4 +1,4 @@
-//! The crash handler: pump off, servos damped, one log line, restart. After the restart the controller sends only
+//! The crash handler: pump and valve off, servos damped, one log line, restart. After the restart the controller sends only
 //! questions until the servos are measured ([D12](protocol_core::decisions#d12)), so they stay damped.
 //!
 //! This file needs no heap, no lock, no interrupt and no intact stack, and each of its loops has a limit. It stores the
@@ -35,11 +35,11 @@ const REPEATS: usize = 4;
 /// Pause before each frame, in microseconds: longer than the longest frame (57 bytes), and longer than a servo's wait
 /// and its answer.
 const PAUSE_MICROS: u32 = 1_000 + board::servo_micros(100);
-/// Polls until a byte is sent, which takes 1,680 cycles at 168 MHz.
+/// Limit on the polls until a byte is sent, which takes 1,680 cycles at 168 MHz.
 const SEND_POLLS: u32 = 20_000;
 
-/// Returns why the chip started: RCC_CSR, and the recorded cause if the last run ended in a crash. Clears both, because
-/// the next start would report them again.
+/// Returns and logs why the chip started: RCC_CSR, and the recorded cause if the last run ended in a crash. Clears both,
+/// because the next start would report them again.
 pub fn take_cause(rcc: &pac::RCC) -> (u32, Option<ResetCause>) {
     let flags = rcc.csr().read().bits();
     rcc.csr().modify(|_, w| w.rmvf().set_bit());

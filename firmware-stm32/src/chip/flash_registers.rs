@@ -7,7 +7,7 @@ use super::clock;
 use super::watchdog::Watchdog;
 use crate::flash::{FlashRegisters, JOURNAL, SECTOR, WORD};
 
-/// Bytes of the flash. Its start address is a multiple of this, and sector 0 begins there.
+/// Bytes of the flash. The address of sector 0, where the flash begins, is a multiple of this.
 const FLASH: usize = 1024 * 1024;
 
 unsafe extern "C" {
@@ -15,7 +15,7 @@ unsafe extern "C" {
     static mut _journal_start: [u32; JOURNAL / WORD];
 }
 
-/// The registers of the chip's flash.
+/// The registers of the chip's flash and of its supply monitor, and the watchdog that has to be fed around an erase.
 pub struct ChipFlashRegisters<'a> {
     registers: pac::FLASH,
     power: pac::PWR,

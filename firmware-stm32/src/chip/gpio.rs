@@ -15,7 +15,7 @@ pub fn enable(rcc: &pac::RCC) {
 /// The registers of a port.
 type GpioRegisters = pac::gpioi::RegisterBlock;
 
-/// Ports of the 64-pin package.
+/// The ports that have all their 16 pins on the 64-pin package.
 #[derive(Clone, Copy)]
 pub enum GpioPort {
     /// Port A.
@@ -95,7 +95,7 @@ impl Pin {
         port.moder().modify(|_, w| w.moder(n).alternate());
     }
 
-    /// Makes the pin an output that is off.
+    /// Makes the pin an output, at the level that switches the device off.
     pub fn into_switch(self, active: Active) -> Switch<DigitalOutput> {
         let switch = Switch::new(DigitalOutput(self), active);
         self.make_output();
@@ -129,7 +129,7 @@ impl Active {
     }
 }
 
-/// A pin that is an output.
+/// A pin that is an output. Setting its level cannot fail.
 pub struct DigitalOutput(Pin);
 
 impl ErrorType for DigitalOutput {

@@ -19,7 +19,7 @@ pub type HostLink = UartPort<USART1, NoDirection, RECEIVE, TRANSMIT>;
 
 static LINE: SharedUart<USART1, NoDirection, RECEIVE, TRANSMIT> = SharedUart::new(NoDirection);
 
-/// Opens the host link.
+/// Opens the host link at `baud`, in bits per second.
 pub fn open(usart: USART1, rates: ClockRates, baud: u32, nvic: &mut NVIC) -> HostLink {
     board::HOST_TRANSMIT.give_to(board::USART_FUNCTION, OutputType::PushPull);
     board::HOST_RECEIVE.give_to(board::USART_FUNCTION, OutputType::PushPull);

@@ -1,8 +1,8 @@
 //! The drivers of the chip: all accesses to registers, interrupts, and the handlers of crashes. `board.rs` is the table of
 //! the pins.
 //!
-//! Firmware and self-test image link the same drivers. Their tests run in the emulator, or on the host where the logic has
-//! a file of its own.
+//! Firmware and self-test image link the same drivers. The drivers are tested in the emulator. Logic that has a file of its
+//! own outside this folder is tested on the host.
 
 pub mod adc;
 pub mod board;

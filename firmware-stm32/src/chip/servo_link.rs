@@ -1,8 +1,8 @@
 //! The servo bus: USART2, half duplex on one wire. Sent bytes come back as an echo, and the receiver has to skip it. A lost
-//! byte causes a wrong checksum or a missing answer: motion-core counts those, this line counts its receive errors.
+//! byte causes a wrong checksum or a missing answer: motion-core counts these two, and the line counts receive errors.
 //!
-//! A buffered bus has a direction pin: it is driven before the first byte, and released when the last stop bit has left. Without
-//! a buffer the pin switches, too, and has no effect.
+//! A buffered bus has a direction pin. The pin switches to transmit before the first byte, and back to receive when the last
+//! stop bit has left. On a bus without a buffer the pin switches too, without effect.
 
 use cortex_m::peripheral::NVIC;
 use stm32f4::stm32f405::{USART2, interrupt};

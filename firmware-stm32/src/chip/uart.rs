@@ -14,8 +14,8 @@
 //! queue. In the emulator the sender then waits. On a wire, an overrun occurs when the next byte is complete. Overruns
 //! and all other receive errors are counted.
 //!
-//! Both sides access the line in a critical section. The loop moves few bytes in each, so that even on the internal
-//! oscillator it takes less than the 10 microseconds within which a byte of the servo bus has to be read.
+//! Both sides access the line in a critical section. The loop moves few bytes in each, so that each takes less than
+//! the 10 microseconds within which a byte of the servo bus has to be read, even on the internal oscillator.
 
 use core::cell::RefCell;
 use core::convert::Infallible;
@@ -29,7 +29,7 @@ use stm32f4::stm32f405 as pac;
 use crate::line_errors::LineErrors;
 use crate::serial_line::{BusDirection, SerialLine, Taken, TransmitEvent, UsartRegisters};
 
-/// Bytes that the loop moves in one critical section.
+/// The most bytes that the loop moves in one critical section.
 pub const CHUNK: usize = 8;
 
 /// One of the chip's USARTs.
@@ -106,7 +106,8 @@ impl<U: Usart, D: BusDirection, const RECEIVE: usize, const TRANSMIT: usize>
         Self(Mutex::new(RefCell::new(SerialLine::new(RegistersOf(PhantomData), direction))))
     }
 
-    /// Opens the line. All other USART settings keep their reset values. It takes the USART, so no other code uses it.
+    /// Opens the line and unmasks its interrupt. USART settings that are not in `setup` keep their reset values. Takes the
+    /// USART, so that no other code uses it.
     pub fn open(&'static self, _: U, setup: &Setup, nvic: &mut NVIC) -> UartPort<U, D, RECEIVE, TRANSMIT> {
         let usart = U::registers();
         let [low, high] = setup.divisor.to_le_bytes();
@@ -151,7 +152,7 @@ impl<U: Usart, D: BusDirection, const RECEIVE: usize, const TRANSMIT: usize>
 pub enum Received<'a> {
     /// The first bytes that are ready to be read; empty if there are none.
     Bytes(&'a [u8]),
-    /// A damaged byte, or a gap where bytes were lost. It is taken.
+    /// A damaged byte, or a gap where bytes were lost. It is already removed from the queue.
     Damage,
 }
 
@@ -206,7 +207,7 @@ impl<U: Usart, D: BusDirection, const RECEIVE: usize, const TRANSMIT: usize>
         }
     }
 
-    /// Takes the next chunk once the last one is consumed.
+    /// Unmasks the interrupt, and takes the next chunk once the last one is consumed. Returns what is ready to be read.
     fn refill(&mut self) -> Taken {
         let Self { line, chunk, len, taken } = self;
         // Unmask even if the loop takes no byte. The same interrupt sends, and the controller may wait for room to send
@@ -244,7 +245,7 @@ impl<U: Usart, D: BusDirection, const RECEIVE: usize, const TRANSMIT: usize> Rea
 impl<U: Usart, D: BusDirection, const RECEIVE: usize, const TRANSMIT: usize> BufRead
     for UartPort<U, D, RECEIVE, TRANSMIT>
 {
-    /// Skips damage.
+    /// Waits until bytes are ready. Skips damage.
     fn fill_buf(&mut self) -> Result<&[u8], Infallible> {
         loop {
             match self.refill() {

@@ -16,8 +16,8 @@ pub struct Watchdog(pac::IWDG);
 impl Watchdog {
     /// Starts the watchdog. Only a reset stops it. TIM2 has to count by then.
     pub fn start(registers: pac::IWDG, dbgmcu: &pac::DBGMCU) -> Self {
-        // A core that a probe halts keeps torque and pump on, so the watchdog goes on and restarts the chip. Only an image
-        // for a debugger lets it stand still. The bit outlives a reset, so it is written in both cases.
+        // While a probe halts the core, torque and pump stay on. So the watchdog keeps counting and restarts the chip, except
+        // in an image for a debugger. The bit outlives a reset, so it is written in both cases.
         dbgmcu.apb1_fz().modify(|_, w| w.dbg_iwdg_stop().bit(cfg!(feature = "halt-watchdog")));
         // The oscillator has to run before the registers take a value (RM0090, section 21.3).
         registers.kr().write(|w| w.key().start());

@@ -9,9 +9,9 @@ use protocol_core::registers::Image;
 
 use super::*;
 
-/// The journal's sectors are 1 and 2.
+/// The number of the journal's first sector. The journal has sectors 1 and 2.
 const FIRST_SECTOR: usize = 1;
-/// Offset of the second one.
+/// Offset of the journal's second sector.
 const SECOND: u32 = 16 * 1024;
 /// Offset behind the journal.
 const END: u32 = 2 * SECOND;

@@ -1,4 +1,4 @@
-//! The line with a model of a USART and a bus: RM0090, section 30.3, figures of the TC and TXE behaviour.
+//! Tests of the serial line with a model of a USART and a bus (RM0090, section 30.3, figures of the TC and TXE behaviour).
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -17,7 +17,7 @@ struct Chip {
     /// The byte in the shift register, and the time when its stop bit has left.
     shift: Option<(u8, u64)>,
     complete: bool,
-    /// SR was read since the last access to DR.
+    /// SR was read at least once. The model does not ask for a read before each access to DR.
     status_was_read: bool,
     event: Option<TransmitEvent>,
     /// The byte in the receiver's data register with its status bits.
@@ -31,7 +31,7 @@ struct Chip {
 }
 
 impl Chip {
-    /// Time passes until `now`.
+    /// Lets time pass until `now`: bytes whose stop bit has left by then are sent.
     fn advance(&mut self, now: u64) {
         while let Some((byte, end)) = self.shift.filter(|&(_, end)| end <= now) {
             self.sent.push((byte, end - BYTE, end));
@@ -70,7 +70,7 @@ impl Chip {
     }
 }
 
-/// Both traits on one chip, which the test observes.
+/// The chip behind both traits of the line. The test keeps a copy, to observe the same chip.
 #[derive(Clone, Debug, Default)]
 struct Shared(Rc<RefCell<Chip>>);
 
@@ -121,7 +121,7 @@ fn line<D: BusDirection>(chip: &Shared, direction: D) -> SerialLine<Shared, D, 6
     SerialLine::new(chip.clone(), direction)
 }
 
-/// Runs the interrupt, `latency` after it is raised, until `end`.
+/// Runs the interrupt handler `latency` microseconds after each interrupt is raised, until `end`.
 fn run<D: BusDirection>(chip: &Shared, line: &mut SerialLine<Shared, D, 64, 64>, latency: u64, end: u64) {
     let start = chip.0.borrow().now;
     let mut serve_at = None;
@@ -256,7 +256,7 @@ fn a_lost_byte_leaves_a_gap_behind_the_good_one() {
     assert_eq!(line.errors().overruns, 1);
 }
 
-/// The loop may be late. Then what lies between two damaged bytes is dropped, too.
+/// If the loop is late, the queue may receive two damaged bytes. Then the bytes between them are dropped, too.
 #[test]
 fn bytes_between_two_damaged_ones_never_join_others() {
     let chip = Shared::default();

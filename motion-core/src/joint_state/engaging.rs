@@ -1,4 +1,4 @@
-//! How a waiting joint engages: it is measured at rest, its servo is sent its goal, is asked whether it has the goal,
+//! How a waiting or silent joint engages: it is measured at rest, its servo is sent its goal, is asked whether it has the goal,
 //! and is given torque ([D12](protocol_core::decisions#d12), [D29](protocol_core::decisions#d29)).
 
 use protocol_core::registers::RegisterFile;
@@ -13,8 +13,8 @@ use crate::torque_check::{TorqueCheck, TorqueFound};
 
 impl JointState {
     /// Checks the goal that the servo shows while the torque of its joint is pending
-    /// ([D12](protocol_core::decisions#d12)). Returns how often the goal has to be sent before torque; `None` if it is
-    /// not known that the servo has it. Then the joint waits for its next answer.
+    /// ([D12](protocol_core::decisions#d12)). Returns how often the goal has to be sent before torque; `None` if the
+    /// joint must not get torque yet. Then the next answer is checked.
     pub(super) fn check_goal(
         &mut self,
         now: Instant,
@@ -47,7 +47,7 @@ impl JointState {
         };
         let stays = may_engage && self.position.is_steady();
         let has_goal = stays && repeats == Some(0) && is_there(answer.reading.position_counts);
-        // A servo with torque follows its goal already. No goal was sent since a question was not answered: then send
+        // A servo with torque follows its goal already. If a question was not answered, no goal was sent since then, so send
         // it once more.
         if held.is_on || has_goal {
             let was_unanswered = !self.torque.is_trusted();
@@ -78,14 +78,15 @@ impl JointState {
         goal.filter(|goal| is_near(*goal, angle)).unwrap_or(angle)
     }
 
-    /// Engages a waiting joint at `angle`, and returns whether it did.
+    /// Engages a waiting or silent joint at `angle`, unless its servo may have restarted, or the joint is let go and may not
+    /// engage yet. Returns whether the joint engaged.
     pub(super) fn engages(
         &mut self,
         now: Instant,
         angle: MicroDegrees,
         registers: &mut RegisterFile,
     ) -> bool {
-        // It is not known yet whether a silent servo has restarted.
+        // The servo was silent, and it is not known yet whether it has restarted.
         if self.drive.is_silent() && !self.torque.is_trusted() {
             return false;
         }

@@ -21,7 +21,8 @@ pub(crate) enum Measured {
     /// The servo of a driven joint has no torque. [`Joints`](crate::joints::Joints) decides what that means
     /// ([D29](protocol_core::decisions#d29)).
     TorqueLost,
-    /// All driven servos have no torque after a long silence ([D29](protocol_core::decisions#d29)).
+    /// The supply was lost: a driven servo has no torque after a long silence of all driven servos
+    /// ([D29](protocol_core::decisions#d29)).
     SupplyLost,
     /// The joint has turned past a set-point that an obstacle held back. [`Joints`](crate::joints::Joints) lets the set-point
     /// catch up.

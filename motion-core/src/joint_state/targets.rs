@@ -1,4 +1,4 @@
-//! The set-point of one joint: towards the targets of the host, as far as an obstacle allows
+//! Moves the set-point of one joint towards the targets of the host, as far as an obstacle allows
 //! ([D10](protocol_core::decisions#d10), [D23](protocol_core::decisions#d23), [D24](protocol_core::decisions#d24),
 //! [D27](protocol_core::decisions#d27)).
 
@@ -24,21 +24,21 @@ impl JointState {
         }
     }
 
-    /// Moves the set-point at once to where the joint is, if that is on the way to the target.
+    /// Moves the set-point at once to where the joint is, as far as that is on the way to the target.
     pub(crate) fn catch_up(&mut self) {
         if let Some(angle) = self.measured {
             self.drive.catch_up(angle);
         }
     }
 
-    /// Moves to a target that the register shows already.
+    /// Starts a move to a coarse target. The register shows it already.
     pub(crate) fn move_to(&mut self, degrees: u8, time: u8) {
         self.target = MicroDegrees::from_degrees(degrees);
         self.obstacle.target_written();
         self.drive.set_target(self.target, time);
     }
 
-    /// Moves to the next point of a stream, whose frame came at `now`. A joint that is let go takes none
+    /// Adds the next point of a stream, whose frame came at `now`. A joint that is let go takes none
     /// ([D28](protocol_core::decisions#d28)).
     pub(crate) fn stream_to(
         &mut self,
@@ -54,14 +54,14 @@ impl JointState {
         }
     }
 
-    /// Moves to a target.
+    /// Starts a move to a target, and shows it in the coarse register.
     pub(crate) fn approach(&mut self, angle: MicroDegrees, time: u8, registers: &mut RegisterFile) {
         self.set_target(angle, registers);
         self.obstacle.target_written();
         self.drive.set_target(angle, time);
     }
 
-    /// Sets the target, without a move.
+    /// Sets the target and shows it in the coarse register, without a move.
     pub(crate) fn set_target(&mut self, target: MicroDegrees, registers: &mut RegisterFile) {
         self.target = target;
         registers.set(TARGET_POSITION.of(self.joint), target.nearest_degree());

@@ -57,8 +57,8 @@ impl Joints {
         }
     }
 
-    /// Moves the set-point of a joint that turned past it to where the joint is, so that it does not turn the joint back
-    /// ([D27](protocol_core::decisions#d27)). The linkage goes first: from outside, set-points go only inwards
+    /// Moves the set-point to where the joint is, after the joint turned past the set-point. Otherwise the servo would turn
+    /// the joint back ([D27](protocol_core::decisions#d27)). The linkage goes first: from outside, set-points go only inwards
     /// ([D25](protocol_core::decisions#d25)).
     #[inline(never)]
     pub(super) fn catch_up(&mut self, joint: Joint, registers: &RegisterFile) -> Measured {

@@ -23,7 +23,7 @@ fn measured(state: MotorState) -> (Joints, RegisterFile) {
     (joints, registers)
 }
 
-/// Measures a joint until it engages, and shows it its goal.
+/// Measures a joint until it engages, then answers that its servo has the goal.
 fn measure(joints: &mut Joints, joint: Joint, counts: u16, registers: &mut RegisterFile) {
     joints.measured(at_ms(0), joint, &answer(counts), true, registers);
     joints.measured(at_ms(10), joint, &answer(counts), true, registers);
@@ -77,8 +77,8 @@ fn d12_a_joint_is_not_given_torque_where_it_was_measured_long_ago() {
     assert_eq!(joints.take_torque(true), [None; JOINTS]);
 }
 
-/// A servo at full load turns its joint further, from `from` counts on and by 25 counts each time. Each answer takes
-/// five control cycles. Returns each measured position and the goal after it.
+/// Simulates a servo at full load that turns its joint further: from `from` counts, by 25 counts between two answers. Each
+/// answer takes five control cycles. Returns each measured position and the goal after it.
 fn turned_on(joints: &mut Joints, registers: &mut RegisterFile, joint: Joint, from: u16) -> Vec<(u16, u16)> {
     registers.set(SPEED.of(joint), 90);
     let mut step = |(millis, position)| {
@@ -104,7 +104,7 @@ fn d27_a_set_point_that_gave_way_never_turns_back_a_joint_that_turned_past_it() 
     assert!(!moments.is_sorted_by_key(|(_, goal)| goal), "it never gave way: {moments:?}");
 }
 
-/// One damaged answer in 256 passes its checksum. After a pause its position is within reach.
+/// One damaged answer in 256 passes its checksum. After a pause, the false position in it is within reach.
 #[test]
 fn d27_a_false_position_after_a_pause_does_not_move_the_set_point_of_a_joint_that_is_held() {
     let (mut joints, mut registers) = measured(MotorState::Servo);

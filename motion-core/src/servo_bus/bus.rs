@@ -1,4 +1,4 @@
-//! The master's end of the servo bus: one transaction at a time.
+//! The master's end of the servo bus: one outstanding read at a time.
 //!
 //! A read has one outcome, a reading or a failure, so a failed read never becomes data. Bytes that do not answer the
 //! outstanding read are dropped: the echo of our own bytes, a late answer, another servo's answer, noise.
@@ -129,7 +129,7 @@ pub struct Bus {
     quiet_at: Instant,
     /// When the wire is free for a frame: neither busy nor noisy. It follows from the three times above.
     free_at: Instant,
-    /// When the outstanding read fails. Later than `busy_until` by the answer delay.
+    /// When the outstanding read fails: after the timeout on the wire and the answer delay.
     answer_until: Instant,
     /// When the guard time after the last frame without an answer ends.
     sent_until: Instant,
@@ -275,13 +275,13 @@ impl Bus {
         }
     }
 
-    /// The frame to send, after one of the calls below.
+    /// The frame to send: the one that the last of the calls below encoded.
     #[must_use]
     pub fn frame(&self) -> &[u8] {
         &self.frame
     }
 
-    /// Reads registers of a joint's servo.
+    /// Encodes a read of a joint's servo, which is outstanding from now on. Drops all bytes received before.
     pub fn ask(&mut self, now: Instant, joint: Joint, question: Question) {
         self.decoder.clear();
         let count = question.count() + self.read_length_tag(joint);
@@ -291,7 +291,7 @@ impl Bus {
         self.answer_until = self.busy_until + self.answer_delay;
     }
 
-    /// Sets the torque switches of some joints simultaneously. No servo answers.
+    /// Encodes a frame that sets the torque switches of some joints simultaneously. No servo answers.
     pub fn set_torque(&mut self, now: Instant, switches: impl Iterator<Item = (Joint, Torque)>) {
         let codes = self.codes;
         frame::sync_write(
@@ -302,8 +302,8 @@ impl Bus {
         self.rest_after_frame(now);
     }
 
-    /// Sets the goals of some joints in servo counts, simultaneously. Each goal time is one control cycle, so that
-    /// consecutive goals give an even movement. No servo answers.
+    /// Encodes a frame that sets the goals of some joints, in servo counts, simultaneously. Each goal time is one control
+    /// cycle, so that consecutive goals give an even movement. No servo answers.
     pub fn set_goals(&mut self, now: Instant, goals: impl Iterator<Item = (Joint, u16)>) {
         let [time_high, time_low] = const { cycle_in_millis().to_be_bytes() };
         frame::sync_write(

@@ -1,6 +1,6 @@
 //! The torque switch of a servo and its two published code tables.
 
-/// The state of a motor.
+/// What the motor of a servo does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Torque {

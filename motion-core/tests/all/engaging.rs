@@ -1,4 +1,5 @@
-//! From no torque to torque: what is sent to the servos in between, at any moment and by any kind of shell.
+//! What is sent to a servo until it has torque: at power-up, on entry to state 1, and after it restarted; with late answers
+//! and lost goals (D12, D13).
 
 use crate::rig::{Rig, STANDARD_COUNTS, ToServos, write};
 use arm_sim::servo::ServoFault;
@@ -16,7 +17,7 @@ fn d12_a_goal_stays_where_the_joint_is_until_it_has_torque() {
         rig.write(32, &[0; 7]);
         rig.write(29, &[2]);
         rig.run_ms(20);
-        // Without torque a loaded joint falls: hands put each where it was, and hold it there.
+        // Without torque a loaded joint falls, so a hand puts each joint back where it was, and holds it there.
         for (joint, counts) in (1..).zip(STANDARD_COUNTS) {
             rig.hand(joint, counts);
         }
@@ -36,7 +37,7 @@ fn d12_a_goal_stays_where_the_joint_is_until_it_has_torque() {
     }
 }
 
-/// An answer and the write may come in one call. The answer is then processed first.
+/// An answer and the write may come in one turn of the shell. The answer is then processed first.
 #[test]
 fn d13_an_answer_that_has_come_is_where_the_servo_state_is_entered() {
     let mut rig = Rig::started();

@@ -1,4 +1,4 @@
-//! The extended block of the registers: fine targets, watchdog, limits and reports (D21, D22, D24 to D26).
+//! The extended block of the registers: fine targets, streams, watchdog, limits and reports (D21 to D26).
 
 use crate::rig::{Rig, STANDARD_POSE, frame, reply, write};
 use arm_sim::servo::ServoFault;
@@ -66,7 +66,7 @@ fn d21_positions_velocities_and_loads_are_those_of_the_servos() {
     assert_eq!(rig.read(FINE_POSITION, 14), [0xFF; 14]);
     rig.run_ms(1_000);
     assert_eq!((rig.get(MEASURED), word(&mut rig, FINE_POSITION + 6)), (0b111_0111, 0xFFFF));
-    // Joint 1 and the reversed joint 3, up and down, at 95 degrees/s.
+    // Joint 1 turns up and the reversed joint 3 down, both at 95 degrees/s.
     rig.write(32, &[50, 50, 50]);
     rig.write(TARGET, &[150, 90, 30]);
     rig.run_ms(300);
@@ -273,7 +273,7 @@ fn d25_a_limit_that_is_broken_cannot_be_switched_on() {
     assert_eq!(rig.get(LIMITS), 2);
     rig.write(52, &[85]);
     assert_eq!(refusal(&mut rig), (5, 52));
-    // One frame from the targets to the limits, which switches the linkage's limit on and breaks it.
+    // One frame that covers 46 to 188. It switches the limit of the linkage on, and its targets break this limit.
     let mut frame = vec![0; 143];
     frame[..7].copy_from_slice(&[90, 90, 65, 90, 90, 90, 80]);
     frame[82..96].copy_from_slice(&fine(&[9_000, 0, 8_399, 9_000, 9_000, 9_000, 8_000]));

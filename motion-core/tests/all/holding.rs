@@ -1,4 +1,5 @@
-//! The arm never falls: what servos are told while a controller starts, and while a servo is silent (D12, D13).
+//! What servos receive while a controller starts, while a servo is silent, and when the motor state changes, so that no
+//! joint that should hold falls (D12, D13).
 
 use crate::rig::{Rig, STANDARD_POSE, ToServos};
 use arm_sim::servo::ServoFault;
@@ -10,7 +11,7 @@ const SERVO: u8 = 1;
 const FORCELESS: u8 = 2;
 const ELBOW: Joint = Joint::ALL[2];
 
-/// Did the elbow's servo hear nothing but questions?
+/// Did the elbow's servo receive only questions?
 fn elbow_was_only_asked(rig: &Rig) -> bool {
     rig.to_servos.iter().all(|(_, told)| match told {
         ToServos::Ask(_) => true,
@@ -19,7 +20,7 @@ fn elbow_was_only_asked(rig: &Rig) -> bool {
     })
 }
 
-/// Makes the elbow's servo lose its answers, and waits until that shows.
+/// Damages all answers of the elbow's servo, and waits until register 242 shows it as silent.
 fn silence_elbow(rig: &mut Rig) {
     rig.plant.set_fault(ELBOW, Some(ServoFault::Garbled(1)));
     rig.run_ms(200);

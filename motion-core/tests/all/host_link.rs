@@ -1,4 +1,5 @@
-//! What a host sees of the arm through its bytes: requests, refusals, feedback, settings (D5, D6, D14, D16, D19).
+//! What a host sees of the arm through its bytes: requests, refusals, feedback, settings, faults (D2, D3, D5, D6, D14, D16,
+//! D19).
 
 use crate::rig::{Rig, STANDARD_POSE, config, frame, reply, write};
 use arm_sim::servo::ServoFault;

@@ -60,8 +60,8 @@ fn d29_after_a_late_call_a_servo_that_restarted_meanwhile_gets_no_old_goal() {
     }
 }
 
-/// How far a joint moves after a late call in which its servo restarted, in thousandths of a degree. The restart is
-/// `micros` later than the first 100 ms of a move.
+/// How far a joint moves after a late call, if its servo restarted since the call before. In thousandths of a degree. The
+/// restart is 100 ms and `micros` after the start of a move.
 fn moved_after_a_restart(joint: Joint, micros: u64) -> i32 {
     let mut rig = Rig::started();
     rig.plant.set_goal_starts_torque(true);
@@ -115,7 +115,7 @@ fn d20_the_valve_closes_before_a_wait_also_when_the_watchdog_acts() {
         rig.write(186, &[20]);
         rig.write(31, &[0]);
         rig.now_us += 1_000_000;
-        // Until the controller waits.
+        // Run until the controller waits.
         rig.run_us(0);
         assert_eq!(
             rig.vacuum.last(),

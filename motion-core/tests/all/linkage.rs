@@ -11,7 +11,7 @@ fn is_legal([two, three]: Pair) -> bool {
     linkage_allows(MicroDegrees::from_degrees(two), MicroDegrees::from_degrees(three))
 }
 
-/// All legal pairs of whole degrees, or of every `step`-th.
+/// All legal pairs of angles on a grid of `step` degrees.
 fn legal_pairs(step: usize) -> Vec<Pair> {
     let angles = || (0..=180_u8).step_by(step);
     angles().flat_map(|two| angles().map(move |three| [two, three])).filter(|pair| is_legal(*pair)).collect()
@@ -52,7 +52,7 @@ fn travel(from: Pair, to: Pair, speeds: Pair, times: Pair) {
     panic!("{from:?} to {to:?} at {speeds:?} in {times:?} does not arrive");
 }
 
-/// A generator that is the same on every machine (SplitMix64).
+/// A generator that is the same on every machine (SplitMix64 with a shorter last step).
 struct Random(u64);
 
 impl Random {

@@ -1,4 +1,4 @@
-//! Writes in map 2.1, through the bytes of a host: targets from positions, reports, loads, offsets (M1 to M9, M12).
+//! Writes in map 2.1, through the bytes of a host: targets from positions, reports, loads, offsets (M1 to M10, M12).
 
 use crate::rig::{Rig, STANDARD_POSE, frame, reply};
 use motion_core::Storage;
@@ -28,7 +28,7 @@ fn with_options(options: u8) -> Rig {
     rig
 }
 
-/// The function, address and count of everything that was sent.
+/// Takes the frames that were sent to the host. Returns function, address and count of each.
 fn sent(rig: &mut Rig) -> Vec<[u8; 3]> {
     rig.to_host.drain(..).map(|(_, bytes)| [bytes[2], bytes[3], bytes[4]]).collect()
 }
@@ -187,8 +187,8 @@ fn m07_d18_fractions_of_a_degree_are_kept() {
     write_21(&mut rig, 54, &IK6);
     rig.run_until_still();
     rig.run_ms(100);
-    // 105.124 degrees of joint 1 are 86 + 496.4 counts; 105 degrees are 86 + 495.8. 88.229 of joint 2: 20 + 433.4, and
-    // 88 degrees: 20 + 434.4.
+    // Joint 1: 105.124 degrees are 86 + 496.4 counts, and 105 degrees 86 + 495.8. Joint 2: 88.229 degrees are 20 + 433.4
+    // counts, and 88 degrees 20 + 434.4.
     let (_, goals) = rig.goals().last().unwrap();
     assert_eq!(goals[..2], [(0, 582), (1, 453)]);
     rig.forget();

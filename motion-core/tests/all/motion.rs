@@ -171,7 +171,7 @@ fn d13_targets_in_the_frame_that_enters_servo_win_over_the_measured_ones() {
     values.extend([0; 7]); // time
     values.extend([120, 100]); // two targets
     rig.write(29, &values);
-    // The forearm was measured where it had drooped to.
+    // Joint 3 was measured at 66 degrees, because the forearm had drooped.
     assert_eq!(rig.targets(), [120, 100, 66, 90, 90, 90, 80]);
     rig.run_ms(2_000);
     rig.assert_at([120, 100, 66, 90, 90, 90, 80], "it arrives");

@@ -1,4 +1,4 @@
-//! The frames of the servo bus: literal bytes both ways, and any cutting and any noise survived.
+//! The frames of the servo bus: golden bytes in both directions, streams cut anywhere, noise, and damaged bytes.
 //!
 //! Golden frames are added to, not edited.
 
@@ -255,7 +255,8 @@ proptest! {
     }
 }
 
-/// Of two frames, one that damage splits is lost. Bytes between two damaged ones may be lost, too.
+/// Two frames with damage at two places. A frame that damage splits is lost, and so is a frame between the two places unless
+/// the bytes before it were pulled in between.
 #[test]
 fn no_frame_continues_across_damage() {
     let stream = [encoded(|buffer| ping(buffer, 1)), encoded(|buffer| ping(buffer, 2))].concat();

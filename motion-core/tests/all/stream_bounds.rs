@@ -15,7 +15,7 @@ fn degrees(degrees: i32) -> MicroDegrees {
     MicroDegrees(degrees * 1_000_000)
 }
 
-/// True if a point is due at `due_us` whose frame comes at `frame_us`. The point before it is due at 1.15 s.
+/// True if the point whose frame comes at `frame_us` is due at `due_us`. The point before it is due at 1.15 s.
 fn is_due_at(due_us: u64, frame_us: u64) -> bool {
     let mut stream = PointStream::NONE;
     stream.push(at_us(1_000_000), PERIOD, degrees(0));
@@ -26,7 +26,7 @@ fn is_due_at(due_us: u64, frame_us: u64) -> bool {
 
 #[test]
 fn d23_a_frame_up_to_a_period_after_the_last_point_belongs_to_the_stream() {
-    // It keeps to the grid at 1.35 s, shifted by a sixteenth of its error of 50 ms.
+    // The point keeps to the grid: 1.35 s, shifted by a sixteenth of the 50 ms to 1.4 s.
     assert!(is_due_at(1_353_125, 1_250_000));
     // A new stream: one and a half periods after its frame.
     assert!(is_due_at(1_400_001, 1_250_001));
@@ -36,11 +36,11 @@ fn d23_a_frame_up_to_a_period_after_the_last_point_belongs_to_the_stream() {
 fn d23_a_frame_later_than_an_eighth_of_a_period_follows_a_lost_one() {
     // The next place of the grid is 1.25 s.
     assert!(is_due_at(1_253_906, 1_162_500));
-    // One place is left out.
+    // One place of the grid is left out for the lost frame.
     assert!(is_due_at(1_347_657, 1_162_501));
 }
 
-/// The set-points at the ends of control cycles, in microseconds.
+/// The set-points at the ends of control cycles. `ends` are in microseconds.
 fn set_points(trajectory: &mut Trajectory, ends: impl Iterator<Item = u64>, speed: u8) -> Vec<MicroDegrees> {
     ends.map(|end| {
         trajectory.advance(at_us(end), speed);

@@ -9,7 +9,7 @@ use proptest::prelude::*;
 use protocol_core::time::{Duration, Instant};
 
 const CYCLE_US: u64 = CYCLE.as_micros();
-/// 372 degrees/s.
+/// The speed register for 372 degrees/s.
 const FASTEST: u8 = 0;
 
 /// A point of a stream: when its frame comes, in microseconds, and its angle in micro-degrees.
@@ -33,8 +33,8 @@ fn set_points(start: i32, arrivals: &[Arrival], period_us: u64, speed: u8, phase
     out
 }
 
-/// A period in microseconds, frames on its grid that are up to `jitter` thousandths of it early or late, and the phase of
-/// the control cycles.
+/// A period in microseconds, the times of 60 frames, and the phase of the control cycles. Each frame is up to `jitter`
+/// thousandths of the period earlier or later than its place on the grid.
 fn jittered(jitter: i64) -> impl Strategy<Value = (u64, Vec<u64>, u64)> {
     let errors = prop::collection::vec(-jitter..=jitter, 60);
     (5_u64..=200, errors, 0..CYCLE_US).prop_map(|(millis, errors, phase)| {
@@ -64,7 +64,7 @@ proptest! {
         let arrivals = ramp(&times, step);
         let out = set_points(0, &arrivals, period, FASTEST, phase);
         let expected = f64::from(step) * CYCLE_US as f64 / period as f64;
-        // The first point starts from rest, and a joint ends at the last.
+        // Without the start from rest before the first points, and the stop at the last point.
         let (first, last) = (2 * step, arrivals.last().unwrap().1 - 2 * step);
         for pair in out.windows(2).filter(|pair| pair[0].1 >= first && pair[1].1 <= last) {
             let velocity = f64::from(pair[1].1 - pair[0].1) / expected;
@@ -105,7 +105,7 @@ proptest! {
     }
 }
 
-/// When the set-point reaches its end and never leaves it again.
+/// The time from which on the set-point stays at its end.
 fn settled(out: &[(u64, i32)]) -> u64 {
     let (_, end) = *out.last().unwrap();
     out.iter().rev().take_while(|(_, set_point)| *set_point == end).last().unwrap().0
@@ -150,7 +150,7 @@ fn d23_a_coarse_target_ends_the_stream_at_once() {
 fn d23_a_point_after_a_coarse_target_is_the_first_one_of_a_new_stream() {
     let at = |millis: u64| Instant::from_micros(millis * 1_000);
     let period = Duration::from_millis(200);
-    // On the grid of the stream that ended it would be due after 225 or 366 ms.
+    // On the grid of the ended stream, the point would be due 225 or 366 ms after its frame.
     for frame in [1_280, 1_330] {
         let mut trajectory = Trajectory::holding(MicroDegrees(0));
         trajectory.stream_to(MicroDegrees(0), at(1_000), period);
@@ -192,7 +192,7 @@ fn d23_a_joint_that_cannot_keep_up_passes_over_older_points() {
 
 #[test]
 fn d23_a_joint_that_cannot_keep_up_goes_towards_the_newest_point() {
-    // 19 degrees/s, and the points do 100 degrees/s to and fro.
+    // The joint turns at 19 degrees/s. The points go away from it at 100 degrees/s, and then are back at its start.
     let times: Vec<u64> = (0..10).map(|k| 1_000_000 + k * 20_000).collect();
     let mut arrivals = ramp(&times, 2_000_000);
     arrivals.extend((10..20).map(|k| (1_000_000 + k * 20_000, 0)));

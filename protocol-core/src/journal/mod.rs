@@ -74,7 +74,7 @@ const NO_SETTINGS: Image = Image([0xFF; Image::LENGTH]);
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Opened {
-    /// Nothing was ever saved: the flash was blank, or the first start was interrupted.
+    /// Nothing was ever saved: the flash was blank, the first start was interrupted, or the log has no settings yet.
     Fresh,
     /// The saved settings.
     Found(Image),
@@ -120,11 +120,11 @@ struct Tail {
 }
 
 impl Tail {
-    /// Before the first record.
+    /// The tail before the first record.
     const BLANK: Self =
         Self { next: SlotAddress { sector: 0, slot: 1 }, generation: 1, following: 2, spare: None };
 
-    /// Continues in the spare.
+    /// Continues in the spare, which becomes home.
     fn change_over(&mut self) -> Result<(), SaveError> {
         let slot = self.spare.take().ok_or(SaveError::Full)?;
         self.next = SlotAddress { sector: self.next.sector ^ 1, slot };
@@ -133,7 +133,7 @@ impl Tail {
         Ok(())
     }
 
-    /// Takes the next slot below `limit`, or the first slot of the spare.
+    /// Takes the next slot below `limit`. Without one, continues in the spare and takes its first free slot.
     fn take_slot(&mut self, limit: u32) -> Result<SlotAddress, SaveError> {
         if self.next.slot >= limit {
             self.change_over()?;
@@ -230,7 +230,7 @@ impl<F: NorFlash> Journal<F> {
         }
     }
 
-    /// Starts a log in the first sector that can be erased.
+    /// Starts a log in the first sector that can be erased: appends a record without settings, and prepares the other sector.
     fn begin(&mut self) -> Result<(), SaveError> {
         let generation = self.tail.generation;
         if self.prepare(0, generation).is_none() {
@@ -271,7 +271,7 @@ impl<F: NorFlash> Journal<F> {
         (spare.waits_for(generation) && spare.end <= Self::SLOTS / 2).then_some(spare.end)
     }
 
-    /// Prepares a sector. Returns its first slot to use.
+    /// Erases a sector and prepares it for a generation. Returns its first slot to use; `None` if the flash refused.
     fn prepare(&mut self, sector: u32, generation: u32) -> Option<u32> {
         self.sectors.prepare(sector, generation).ok()?;
         Some(1)

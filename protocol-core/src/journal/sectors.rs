@@ -1,6 +1,7 @@
 //! Two sectors of slots: survey a sector, append a record, prepare a blank sector.
 //!
-//! Every operation is verified by reading back. The journal decides when to erase and program, and which record counts.
+//! Every program and erase operation is verified by reading back. The journal decides when to erase and program, and which
+//! record counts.
 
 use embedded_storage::nor_flash::NorFlash;
 
@@ -35,7 +36,7 @@ pub(super) struct Survey {
 }
 
 impl Survey {
-    /// Does this sector hold the newer record of the two?
+    /// Does this sector hold a newer record than the other sector?
     pub(super) fn is_later_than(&self, other: &Self) -> bool {
         let is_later = |mine: Record| other.newest.is_none_or(|theirs| mine.is_later_than(&theirs));
         self.newest.is_some_and(is_later)
@@ -47,7 +48,7 @@ impl Survey {
         self.mark == slot::mark(generation) && self.newest.is_none()
     }
 
-    /// Was nothing ever saved, or was the very first start interrupted?
+    /// Are both sectors blank, or is one prepared for generation 1 and without a record? Then nothing was ever saved.
     pub(super) fn was_never_used(&self, other: &Self) -> bool {
         let is_blank = |sector: &Self| sector.end == 1 && sector.mark == BLANK[0];
         let is_first = |sector: &Self| sector.waits_for(1);

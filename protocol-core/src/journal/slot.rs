@@ -49,7 +49,7 @@ pub(super) struct Record {
 }
 
 impl Record {
-    /// Was this record written after `other`, in the other sector?
+    /// Was this record written after `other`? The two are in different sectors, so their generations differ.
     pub(super) fn is_later_than(&self, other: &Self) -> bool {
         let steps = self.generation.wrapping_sub(other.generation) & LAST_GENERATION;
         (1..=LAST_GENERATION / 2).contains(&steps)

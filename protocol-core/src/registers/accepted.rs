@@ -1,4 +1,4 @@
-//! A write of a host that was checked and may be applied: its effect on each register.
+//! A checked write, and its effect on each register.
 
 use super::map::OFFSET;
 use super::map21::{self, Map};
@@ -8,7 +8,8 @@ use super::rules::{EXTENDED_START, rule, rule_21};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Accepted<'a> {
     pub(super) map: Map,
-    /// The first address of the write that can have an effect: from the EEPROM region on, or from its end while locked.
+    /// The first address of the write that can have an effect. Writes have no effect on the ROM below the EEPROM region,
+    /// and none on the EEPROM region while it is locked.
     pub(super) start: u8,
     pub(super) values: &'a [u8],
 }
@@ -20,8 +21,8 @@ impl Accepted<'_> {
         self.map
     }
 
-    /// The new value of the register at `address`, an offset in sign and magnitude; `None` if the write does not
-    /// include it or has no effect on it ([D15](crate::decisions#d15)).
+    /// The new value of the register at `address`; an offset is in sign and magnitude. `None` if the write does not
+    /// include the register or has no effect on it ([D15](crate::decisions#d15)).
     #[must_use]
     pub fn value_at(&self, address: u8) -> Option<u8> {
         let value = *self.values.get(usize::from(address.checked_sub(self.start)?))?;
@@ -31,7 +32,8 @@ impl Accepted<'_> {
         }
     }
 
-    /// The new value of the two-byte register at `address`; `None` if the write does not include it.
+    /// The new value of the two-byte register at `address`; `None` if the write does not include the register or has no
+    /// effect on it.
     #[must_use]
     pub fn word_at(&self, address: u8) -> Option<u16> {
         let low = self.value_at(address)?;
@@ -40,7 +42,7 @@ impl Accepted<'_> {
         Some(u16::from_le_bytes([low, high]))
     }
 
-    /// Does the write reach the extended block? Only from that block on do registers have two bytes or a minimum.
+    /// Does the write reach the extended block or an address above it? Only there do registers have two bytes or a minimum.
     #[must_use]
     pub fn is_extended(&self) -> bool {
         usize::from(self.start) + self.values.len() > usize::from(EXTENDED_START)
@@ -57,7 +59,7 @@ impl Accepted<'_> {
     }
 }
 
-/// Converts a byte that function 04 writes to the value that is stored: an offset becomes sign and magnitude.
+/// Converts a byte of a write in map 2.1 to the stored value: an offset becomes sign and magnitude, other bytes stay.
 pub(super) fn from_map21(address: u8, byte: u8) -> u8 {
     if map21::OFFSET.holds(address) {
         OFFSET.range.encode_byte(map21::OFFSET.range.decode_byte(byte)).unwrap_or(0)

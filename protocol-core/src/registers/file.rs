@@ -1,4 +1,4 @@
-//! The current value of every register, and the rules for writes of a host.
+//! The current value of every register, and the check of writes of a host.
 //!
 //! A write is checked completely, then applied completely ([D15](crate::decisions#d15) to [D17](crate::decisions#d17)).
 //! [`RegisterFile::check`] returns an [`Accepted`] write, which the arm can inspect before [`RegisterFile::apply`].
@@ -56,7 +56,8 @@ impl RegisterFile {
         file
     }
 
-    /// Shows the offsets as before the first write ([M5](crate::decisions#m5), [M12](crate::decisions#m12)).
+    /// Shows the offsets in the encoding that bit 0 of register 20 selects, as before the first write
+    /// ([M5](crate::decisions#m5), [M12](crate::decisions#m12)).
     pub fn forget_last_write(&mut self) {
         let is_biased = self.get(OPTIONS.address) & option::BIASED_OFFSETS != 0;
         self.show_offsets(if is_biased { Map::V21 } else { Map::V22 });
@@ -88,7 +89,7 @@ impl RegisterFile {
         i8::try_from(range.decode_byte(shown)).unwrap_or(0)
     }
 
-    /// The value of the register at `address`, an offset in sign and magnitude.
+    /// The stored value of the register at `address`. An offset is in sign and magnitude, whatever 13 to 19 show.
     fn setting(&self, address: u8) -> u8 {
         let offset =
             |offsets: &[u8; JOINTS]| offsets.get(usize::from(address.wrapping_sub(OFFSET.address))).copied();
@@ -143,7 +144,8 @@ impl RegisterFile {
     /// Checks a write of the host in map 2.2 without applying it.
     ///
     /// # Errors
-    /// The first register that is writable now and whose value is out of range, or that is half of a two-byte register.
+    /// [`Refused`] with the first register whose value is out of range, or which has two bytes of which the write covers only
+    /// one. Registers that the write cannot change are not checked.
     pub fn check<'a>(&self, address: u8, values: &'a [u8]) -> Result<Accepted<'a>, Refused> {
         let (start, values) = self.unlocked(address, values);
         let accepted = Accepted { map: Map::V22, start, values };
@@ -160,7 +162,7 @@ impl RegisterFile {
     /// Checks a write of the host in map 2.1 without applying it.
     ///
     /// # Errors
-    /// The first register that is writable now and whose value is out of range.
+    /// [`Refused`] with the first register whose value is out of range. Registers that the write cannot change are not checked.
     pub fn check_map21<'a>(&self, address: u8, values: &'a [u8]) -> Result<Accepted<'a>, Refused> {
         let (start, values) = self.unlocked(address, values);
         for ((rule, &value), address) in rules_21_from(start).iter().zip(values).zip(start..) {
@@ -171,7 +173,8 @@ impl RegisterFile {
         Ok(Accepted { map: Map::V21, start, values })
     }
 
-    /// The part of a write that can have an effect: from the EEPROM region on, or from its end while locked.
+    /// The part of a write that can have an effect, with its first address: the part from the EEPROM region on, or from the
+    /// end of that region while it is locked.
     fn unlocked<'a>(&self, address: u8, values: &'a [u8]) -> (u8, &'a [u8]) {
         let is_locked = self.get(EEPROM_LOCK.address) != 0;
         let start = address.max(if is_locked { EEPROM_END } else { EEPROM_START });
@@ -203,7 +206,7 @@ impl RegisterFile {
         self.show_offsets(Map::V21);
     }
 
-    /// The present values of the EEPROM region.
+    /// The present values of the EEPROM region, with the offsets in sign and magnitude.
     #[must_use]
     pub fn image(&self) -> Image {
         let mut image = Image([0; Image::LENGTH]);

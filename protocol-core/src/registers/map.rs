@@ -1,6 +1,6 @@
-//! THE TABLE: every register of the 7Bot V2 (docs/protocol.md).
+//! THE TABLE: every register of map 2.2 of the 7Bot V2 (docs/protocol.md).
 //!
-//! No other file holds a register address as a number.
+//! Outside tests, only this table and the table of map 2.1 hold register addresses as numbers.
 
 use super::range::Range;
 use super::spec::{Register, eeprom, ram, rom, well_formed};
@@ -151,7 +151,7 @@ pub mod fault {
     /// A drop of the supply voltage caused the last restart.
     pub const BROWN_OUT_RESTART: u8 = 1 << 3;
     /// The crystal failed; the chip runs on its internal oscillator: 1 % off at 25 degrees Celsius, 4 % over temperature.
-    /// A serial line tolerates about 3.5 % between both ends, so it works at room temperature at best.
+    /// A serial line tolerates about 3.5 % between its two ends, so the host link works at room temperature at best.
     pub const CRYSTAL_FAILED: u8 = 1 << 4;
     /// Bytes from the host were lost, because the receive buffer was full.
     pub const RECEIVE_OVERRUN: u8 = 1 << 5;
@@ -207,12 +207,12 @@ pub mod effector {
 
 /// The bits of [`LIMITS`].
 pub mod limit {
-    /// The linkage of joints 2 and 3.
+    /// The limit of the linkage of joints 2 and 3.
     pub const LINKAGE: u8 = 1 << 0;
     /// The smallest and the largest sum of the angles of joints 2 and 3, in degrees: the linkage allows 19 to 161 degrees for
     /// joint 3 - 65 degrees + joint 2 ([D25](crate::decisions#d25)).
     pub const LINKAGE_SUM: (u8, u8) = (84, 226);
-    /// The claw.
+    /// The limit of the claw, joint 7.
     pub const CLAW: u8 = 1 << 1;
     /// The largest angle of joint 7, in degrees: its servo then is at 1023 counts.
     pub const CLAW_MAX: u8 = 84;

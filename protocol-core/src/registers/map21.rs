@@ -132,7 +132,7 @@ impl Map {
 }
 
 /// The row whose value a read of `address` gives ([M3](crate::decisions#m3)): the row of map 2.2 or, if that is missing
-/// or reserved, the row of map 2.1. `None` if neither map has one.
+/// or reserved, the row of map 2.1. A reserved row of map 2.2 comes last. `None` if neither map has a row.
 #[must_use]
 pub fn find_readable(address: u8) -> Option<&'static Register> {
     let open = |row: &&Register| row.access != super::Access::Reserved;
@@ -158,7 +158,7 @@ mod tests {
 
     #[test]
     fn a_builder_sets_the_range_of_the_offsets() {
-        // In the tables it runs at compile time.
+        // In the tables, the builder runs at compile time only.
         assert_eq!(eeprom(13).biased(16).range, OFFSET.range);
     }
 }

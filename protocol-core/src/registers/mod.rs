@@ -1,4 +1,4 @@
-//! The registers of the arm: 256 registers of one byte (docs/protocol.md, sections 3, 4 and 8).
+//! The registers of the arm: 256 registers of one byte (docs/protocol.md, sections 3, 4, 6 and 8 to 10).
 //!
 //! ```text
 //!  joint, range, unit, spec   the types of a row              (no addresses)
@@ -10,7 +10,7 @@
 //!  accepted, file       the current values                  (no wire, no motion)
 //! ```
 //!
-//! The maker has two maps, 2.2 and 2.1. The function code of a write says in which one it is
+//! The maker has two maps, 2.2 and 2.1. The function code of a write tells its map
 //! ([M1](crate::decisions#m1)); reads are one union of both ([M3](crate::decisions#m3)). The register file, the
 //! journal's contents, the simulator's trace, the host tools and `docs/registers.md` all use these two tables.
 

@@ -10,8 +10,9 @@ pub enum Range {
     /// Bit 7 is the sign, the rest a magnitude up to and including this one; 0x80 is a zero
     /// ([D9](crate::decisions#d9)).
     SignMagnitude(u8),
-    /// A number from minus this one to this one, at most 56, in any of three encodings: 128 more than the number, the
-    /// number itself, or 256 more than a negative number ([M5](crate::decisions#m5)). The three do not overlap.
+    /// A number whose magnitude is at most this one, in any of three encodings: 128 more than the number, the number itself,
+    /// or 256 more than a negative number ([M5](crate::decisions#m5)). The encodings do not overlap, because the
+    /// largest magnitude is at most 56.
     Biased(u8),
     /// Two bytes: every number up to and including this one.
     WordUpTo(u16),

@@ -55,7 +55,7 @@ pub(super) const fn keeps_bytes_of_21(address: u8) -> bool {
 pub struct Refused {
     /// One of [`refusal`](super::map::refusal).
     pub reason: u8,
-    /// The first register that is the reason; of a two-byte register its low byte.
+    /// The first register that causes the refusal; of a two-byte register its low byte.
     pub address: u8,
 }
 
@@ -90,7 +90,7 @@ impl Rule {
         value & self.mask <= self.max
     }
 
-    /// As [`Self::allows`], for a rule of map 2.1, which has biased ranges in place of signs and magnitudes.
+    /// As [`Self::allows`], for a rule of map 2.1, whose offsets are biased instead of in sign and magnitude.
     pub(super) const fn allows_21(self, value: u8) -> bool {
         let bias = if self.mask == !SIGN { self.max / 2 } else { 0 };
         value.wrapping_add(bias) & self.mask <= self.max
@@ -106,7 +106,7 @@ struct ValueRule {
 }
 
 impl ValueRule {
-    /// The reason why this value refuses a write of `values` from `start` on (D16, D22); `None` if it does not.
+    /// The reason for which this rule refuses a write of `values` from `start` on (D16, D22); `None` if it does not.
     fn refusal(self, start: u8, values: &[u8]) -> Option<u8> {
         let byte = |address: u8| values.get(usize::from(address.checked_sub(start)?)).copied();
         let high = if self.range.width() == 2 { byte(self.address + 1) } else { Some(0) };
@@ -121,7 +121,8 @@ impl ValueRule {
     }
 }
 
-/// The first value that refuses a write of `values` from `start` on (D16, D22); `None` if none does.
+/// The refusal of a write of `values` from `start` on by the first [`ValueRule`] that refuses it (D16, D22); `None` if none
+/// does.
 pub(super) fn first_refused_value(start: u8, values: &[u8]) -> Option<Refused> {
     let refused = |value: &ValueRule| {
         let reason = value.refusal(start, values)?;

@@ -8,7 +8,7 @@
 //! The remainder modulo `x^15 + x + 1` leaves two candidates for the CRC. Parity selects the CRC from the two.
 //! The unit tests compare the result with the `crc` crate.
 
-/// `x^15 + x + 1` in reflected notation of 16 bits: the lowest is x^15.
+/// `x^15 + x + 1` in reflected notation of 16 bits: bit 0 is x^15.
 const FACTOR: u32 = 0xC001;
 
 /// The CRC of `bytes`. On the wire its low byte comes first.
@@ -63,7 +63,7 @@ impl Crc {
     /// Appends the lowest `bits` bits of `data`.
     #[inline(always)]
     const fn step(self, data: u32, bits: u32) -> Self {
-        // Two shifts reduce the bits above x^31. The few bits that overflow by these shifts are reduced once more.
+        // Two shifts reduce the bits above x^31. The few bits that the shifts move above x^31 again are reduced once more.
         let leaving = self.sum << (32 - bits);
         let leaving = leaving ^ leaving << 30 ^ leaving << 28;
         let staying = if bits < 32 { self.sum >> bits } else { 0 };
@@ -109,7 +109,7 @@ mod tests {
 
     #[test]
     fn every_single_bit_of_a_longest_frame_agrees_with_the_crc_crate() {
-        // The CRC is affine, so these messages and the zero message prove it for every message of the length.
+        // The CRC is affine, so these messages and the zero message prove the agreement for every message of the length.
         for length in [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 260] {
             let mut message = vec![0; length];
             assert_eq!(checksum(&message), REFERENCE.checksum(&message));

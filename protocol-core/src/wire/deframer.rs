@@ -67,7 +67,8 @@ impl<D: Direction> Deframer<D> {
     }
 
     /// Takes bytes that came since the last call, and returns how many. Offer the rest again after
-    /// [`Deframer::pull`] has made room. After a timeout it takes nothing until `pull` has passed the bytes before it.
+    /// [`Deframer::pull`] has made room. After a timeout, no bytes are taken until `pull` has passed all bytes before the
+    /// timeout.
     /// An empty slice states that the line is silent at `now` and that no byte waits anywhere.
     pub fn push(&mut self, now: Instant, bytes: &[u8]) -> usize {
         if bytes.is_empty() {

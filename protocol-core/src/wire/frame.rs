@@ -1,6 +1,6 @@
 //! One frame: its layout, its parser, its encoder.
 //!
-//! This file does not know streams, which are the deframer's work, or the meaning of a request.
+//! This file knows neither streams, which the deframer handles, nor the meaning of a request.
 
 use nom::bytes::streaming::take;
 use nom::{IResult, Needed};
@@ -97,13 +97,13 @@ impl Direction for ToHost {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Frame<'a> {
-    /// What the frame is.
+    /// The function code. It tells what the fields below mean.
     pub function: Function,
     /// The first register; the level of an alarm.
     pub address: u8,
     /// How many registers; the kind of an alarm.
     pub count: u8,
-    /// Values of the registers; empty in a read request.
+    /// Values of the registers; empty in a read request and in an alarm.
     pub data: &'a [u8],
 }
 

@@ -8,7 +8,7 @@
 //!                 is incomplete  up to gap_end
 //! ```
 //!
-//! A timeout that the search has not passed yet is at the end of the bytes: until then the deframer appends none.
+//! The deframer appends no bytes while the search has not passed a timeout, so such a timeout is at the end of the bytes.
 //!
 //! This file handles positions only. The deframer owns the bytes and appends to them while the search goes on.
 
@@ -18,7 +18,7 @@ use super::frame::{Defect, Direction, Frame, HEADER, MIN_LENGTH, ParseOutcome, p
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Search {
-    /// Everything before the head is finished.
+    /// The search is finished with all bytes before the head.
     head: usize,
     /// The search has no new result before the buffer has this length.
     wanted: usize,
@@ -59,7 +59,7 @@ impl Search {
 
     /// Records that the line was silent for the gap after `end` bytes.
     pub(super) const fn note_gap(&mut self, end: usize) {
-        // An unfinished scan keeps its end. The next call records this gap again.
+        // While a scan is unfinished, `gap_end` must stay. The first call after the scan records the new gap.
         if self.gap_end < end && self.evaluated_end >= self.gap_end {
             self.gap_end = end;
             self.scan_pos = self.head;
@@ -89,7 +89,7 @@ impl Search {
         }
     }
 
-    /// Searches until there is a frame or a defect to report.
+    /// Searches for the next frame or defect to report; `None` if that needs more bytes.
     pub(super) fn next<'a, D: Direction>(&mut self, bytes: &'a [u8]) -> Option<Result<Frame<'a>, Defect>> {
         while bytes.len() >= self.wanted {
             let found =

@@ -1,5 +1,4 @@
-//! A million good frames between disturbances of every kind: how many are lost, and how late the rest come
-//! (D3, D4).
+//! A million good frames for each kind of disturbance: how many are lost, and how late the rest come (D3, D4).
 
 use crate::disturbed_line::{Disturbance, run};
 use crate::stream::GAP_US;

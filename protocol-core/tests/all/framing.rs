@@ -1,4 +1,4 @@
-//! Streams of bytes, damaged and cut at will: what the deframer makes of them (D1 to D4).
+//! What the deframer finds in streams of bytes that are damaged or cut anywhere (D1 to D5).
 
 use crate::stream::{self, Event, GAP_US, LONG_SILENCE_US, Model, Received, frame, receive};
 use proptest::prelude::*;
@@ -6,8 +6,8 @@ use protocol_core::time::Instant;
 use protocol_core::wire::frame::{Defect, ParseOutcome, parse};
 use protocol_core::wire::{Deframer, MAX_LENGTH, ToArm, ToHost, deframer};
 
-/// A part of a stream that is likely to cause errors: whole frames, pieces of frames, headers without their data,
-/// ranges past address 255, noise rich in header bytes.
+/// A part of a stream that is likely to cause errors, such as a whole or nested frame, a piece of a frame, a header without
+/// its data, a range past address 255, or noise rich in header bytes.
 fn stretch() -> impl Strategy<Value = Vec<u8>> {
     let noise = prop_oneof![Just(0xAA_u8), Just(0x77), Just(0x06), Just(0x04), Just(0x03), any::<u8>()];
     let function = prop_oneof![Just(3), Just(4), Just(6)];
@@ -140,7 +140,7 @@ fn d02_a_range_may_end_at_255_and_not_behind() {
 
 #[test]
 fn d02_what_a_malformed_frame_holds_is_searched_like_any_bytes() {
-    // Registers 170 to 288. The address and the count read as a header, too, of a frame with a wrong CRC.
+    // The range is 170 to 288. Its address and count, AA 77, are also the header of a frame with a wrong CRC.
     let malformed = stream::raw_frame(6, 0xAA, 0x77, &[3; 0x77]);
     assert!(malformed[3..].starts_with(&[0xAA, 0x77, 3, 3, 3]));
     let expected = [Received::MalformedRange(0xAA), Received::WrongCrc];
@@ -183,7 +183,7 @@ fn d05_a_stream_longer_than_the_buffer_loses_nothing_however_it_is_cut() {
     }
 }
 
-/// A byte with a framing error belongs to no frame (D3): the frame around it is lost, and no other one.
+/// A byte with a framing error belongs to no frame (D3). Only the frame around this byte is lost.
 #[test]
 fn d03_no_frame_continues_across_a_damaged_byte() {
     let frames = [frame(6, 46, &[1]), frame(6, 46, &[2]), frame(6, 46, &[3])];

@@ -1,4 +1,4 @@
-//! Frames as they were released, byte by byte, both ways. Add to them; never edit one.
+//! Frames as they were released, byte by byte, in both directions. Add to them; never edit one.
 
 use protocol_core::request::{Reply, Request};
 use protocol_core::time::{Duration, Instant};

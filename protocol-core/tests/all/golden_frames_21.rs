@@ -4,7 +4,7 @@ use protocol_core::request::{Alarm, Reply, Report, Request};
 use protocol_core::time::{Duration, Instant};
 use protocol_core::wire::{Deframer, Direction, FrameBuffer, ToArm, ToHost};
 
-/// What each read asks for, and its bytes.
+/// Each read: what it asks for, its address, its count, and the bytes of the frame.
 #[rustfmt::skip]
 const READS: &[(&str, u8, u8, &[u8])] = &[
     ("device code",    0,  1, &[0xAA, 0x77, 0x03, 0x00, 0x01, 0x16, 0x6C]),
@@ -22,7 +22,7 @@ const READS: &[(&str, u8, u8, &[u8])] = &[
     ("all loads",      91, 7, &[0xAA, 0x77, 0x03, 0x5B, 0x07, 0xAD, 0x5E]),
 ];
 
-/// What each write sets, its address, values and bytes.
+/// Each write: what it sets, its address, its values, and the bytes of the frame.
 #[rustfmt::skip]
 const WRITES: &[(&str, u8, &[u8], &[u8])] = &[
     ("id 5",           11, &[5], &[0xAA, 0x77, 0x04, 0x0B, 0x01, 0x05, 0x5D, 0x7B]),
@@ -84,7 +84,7 @@ const WRITES: &[(&str, u8, &[u8], &[u8])] = &[
     ("nothing",        0,  &[], &[0xAA, 0x77, 0x04, 0x00, 0x00, 0x66, 0x6D]),
 ];
 
-/// What each answer holds, its address, values and bytes.
+/// Each reply: what it holds, its address, its values, and the bytes of the frame.
 #[rustfmt::skip]
 const REPLIES: &[(&str, u8, &[u8], &[u8])] = &[
     ("device code",    0, &[7], &[0xAA, 0x77, 0x03, 0x00, 0x01, 0x07, 0xAC, 0x0C]),
@@ -98,7 +98,7 @@ const REPLIES: &[(&str, u8, &[u8], &[u8])] = &[
      &[0xAA, 0x77, 0x03, 0x5B, 0x07, 0x80, 0x80, 0x80, 0x80, 0x80, 0x80, 0x80, 0xA6, 0x2A]),
 ];
 
-/// What each report holds, its address, values and bytes.
+/// Each report: what it holds, its address, its values, and the bytes of the frame.
 #[rustfmt::skip]
 const REPORTS: &[(&str, u8, &[u8], &[u8])] = &[
     ("angles of the standard pose", 83, &[90, 90, 65, 90, 90, 90, 80],

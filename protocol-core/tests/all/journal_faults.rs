@@ -6,7 +6,7 @@ use flash_model::{Cut, EraseTear, Flash, Operation, ProgramTear, Random};
 use protocol_core::journal::{Journal, Opened, SaveError};
 use protocol_core::registers::Image;
 
-/// A flash on which `saves` images were saved, or as many as there is room for, and the last of them.
+/// A flash on which `saves` images were saved, or as many as there is room for, and the last image.
 fn saved<const SECTOR: usize>(saves: u64) -> (Flash<SECTOR>, Image) {
     let (mut journal, _) = Journal::open(Flash::<SECTOR>::new(2));
     let count = saves.min(journal.room() as u64);
@@ -16,7 +16,8 @@ fn saved<const SECTOR: usize>(saves: u64) -> (Flash<SECTOR>, Image) {
     (journal.release(), image(count))
 }
 
-/// Flips each bit of a flash with `saves` images, and checks that two starts find the last one. Returns how many bits.
+/// Flips each bit of a flash with `saves` images in turn, and checks that the next two starts find the last image. Returns
+/// the number of bits.
 fn flip_every_bit<const SECTOR: usize>(saves: u64) -> usize {
     let (flash, newest) = saved::<SECTOR>(saves);
     let bits = 2 * SECTOR * 8;
@@ -173,11 +174,11 @@ fn a_save_tries_two_slots_and_no_more() {
     }
 }
 
-/// A record that was begun in the spare may win over home at the next start, so home accepts no more saves.
+/// At the next start, a record that was begun in the spare may count as newer than home, so home accepts no more saves.
 #[test]
 fn a_move_that_fails_is_the_end_of_saving_but_not_of_the_settings() {
     let (mut flash, newest) = saved::<512>(8);
-    // A bit of the seal that is to be 0, in the two slots that a move tries.
+    // Wear out a bit of the seal that has to become 0, in both slots that a move tries.
     let worn_out = [1, 2].map(|slot| 4_096 + slot * 256 + 224);
     worn_out.into_iter().for_each(|bit| flash.wear_out_bit(bit));
     let (mut journal, opened) = Journal::open(flash);
@@ -213,8 +214,8 @@ fn noise_in_the_spare_leaves_the_settings() {
     assert_eq!(Journal::open(flash).1, Opened::Found(newest));
 }
 
-/// A word whose programming is cut at its very beginning may leave no trace. On a flash that disturbs bits which were to stay
-/// ones, a record in such a slot would not last: the slot is not used again.
+/// A word whose programming is cut at its very beginning may leave no trace. If the cut disturbed bits that were to stay
+/// ones, a record in this slot would not last. So the slot is not used again.
 #[test]
 fn a_slot_that_was_begun_without_a_trace_is_skipped() {
     let mut cases = 0;

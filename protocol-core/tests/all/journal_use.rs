@@ -115,7 +115,8 @@ fn what_is_in_doubt_is_appended_again_before_anything_is_erased() {
 #[test]
 fn a_start_moves_to_the_spare_when_less_than_a_quarter_of_home_is_free() {
     use Operation::{Erase, Program};
-    // 16 slots. The first says that there are no settings, one is skipped after a start, four are for starts.
+    // Of the 16 slots, one holds the mark and one the record without settings. A start skips one, and four are reserved for
+    // starts.
     for (saves, moves) in [(5, false), (6, true)] {
         let mut world = World::<512>::new();
         assert_eq!(world.cycle(saves, None), End::Quiet);

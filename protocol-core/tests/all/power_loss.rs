@@ -1,8 +1,8 @@
 //! D19: the power is cut at every program and every erase, in every way that a cell can be left, once and then again
 //! before the first cut is repaired. The settings found are those before or after a save, and never others.
 //!
-//! `JOURNAL_LONG=1` tries much more, `JOURNAL_SEED=n` the random part from another seed; three cuts in a row
-//! are among the ignored tests. How much was tried is printed (`--nocapture`).
+//! With `JOURNAL_LONG=1` the tests try much more. `JOURNAL_SEED=n` is another seed for the random cuts. The test of three
+//! cuts in a row is ignored by default. How much was tried is printed (`--nocapture`).
 
 use crate::journal_world::{End, REAL, World, cuts, every_cut, image, report};
 use flash_model::{Cut, EraseTear, Flash, Operation, ProgramTear, Random};
@@ -32,7 +32,7 @@ impl Tally {
         report(tried, &format!("{steps}{cases} cuts"));
     }
 
-    /// Counts a case, after some quiet power cycles.
+    /// Runs some quiet power cycles, with their checks, and counts the case.
     fn settle<const SECTOR: usize>(&mut self, mut world: World<SECTOR>) {
         world.settle();
         self.cases += 1;
@@ -121,7 +121,7 @@ fn cut_again<const SECTOR: usize>(world: World<SECTOR>, saves: usize, cuts: u32,
 
 #[test]
 fn a_second_cut_at_every_step_before_the_first_is_mended() {
-    // The first start, a change-over, and full to the end.
+    // The numbers of saves give the first start, a change-over, and a flash that is full to its end.
     let tally = cut_everything_again::<512>([0, 2, 14, 23], 1, 2);
     assert!(tally.cases >= 100_000, "{tally:?}");
     assert_eq!((tally.most_erases, tally.most_programs), (2, 18), "the bounds are not put to the test");
@@ -134,12 +134,12 @@ fn a_second_cut_at_every_step_before_the_first_is_mended() {
 #[test]
 #[ignore = "takes minutes"]
 fn a_third_cut_at_every_step_before_the_others_are_mended() {
-    // Starts only, then with a save each.
+    // First only starts after the first cut, then starts with a save each.
     cut_everything_again::<512>([0, 1, 13], 0, 3);
     cut_everything_again::<512>([1], 1, 3);
 }
 
-/// Power cycles of any length, most of them cut somewhere.
+/// Runs power cycles with random numbers of saves. In seven of eight, the power is cut at a random operation.
 fn cut_at_random<const SECTOR: usize>(cycles: u64, most_saves: usize) {
     let seed = std::env::var("JOURNAL_SEED").map_or(2_026, |seed| seed.parse().unwrap());
     println!("{SECTOR} B sectors, JOURNAL_SEED={seed}");
@@ -168,11 +168,12 @@ fn cuts_at_random_in_long_lives() {
     cut_at_random::<REAL>(4_000 * times, 1_000);
 }
 
-/// The result of an interrupted erase is random, so each kind is tried many times.
+/// Cuts the power in each erase of some power cycles, and returns the number of cases. The result of an interrupted erase is
+/// random, so each kind of cut is tried `chances` times.
 fn cut_erases<const SECTOR: usize>(chances: usize) -> u64 {
     let mut world = World::<SECTOR>::new();
     let mut cases = 0;
-    // Cycles that go on in the spare: the start after each has a sector to erase, or two.
+    // Some of these cycles continue in the spare, so that the start after them erases one sector or two.
     for saves in [1, SECTOR / 32, SECTOR / 16, SECTOR / 20, 0] {
         let operations = world.operations(saves).into_iter().enumerate();
         for (after, _) in operations.filter(|(_, operation)| *operation == Operation::Erase) {
@@ -212,7 +213,7 @@ fn fill_spare_with_remains(world: &mut World<512>) {
     }
 }
 
-/// A cut that leaves half a word.
+/// A cut after `after` operations that leaves half a word.
 fn torn_after(after: usize) -> Cut {
     Cut { after, program: ProgramTear::Bytes(2), erase: EraseTear::All, seed: 1 }
 }
@@ -256,8 +257,8 @@ fn a_record_with_remains_behind_it_is_appended_again() {
     world.settle();
 }
 
-/// Home full to its last slot, its newest record in doubt, and the other sector not blank: there is no slot to make
-/// it firm in, so the other sector is erased first, and what is in doubt is moved there.
+/// Home is full to its last slot, its newest record is in doubt, and the other sector is not blank. No slot is left to append
+/// the record again, so the other sector is erased first, and the record is moved there.
 #[test]
 fn what_is_in_doubt_and_finds_no_slot_is_moved() {
     use Operation::{Erase, Program};

@@ -1,5 +1,5 @@
-//! Every read and every write that there is, against the table (D1, D2, D6, D15 to D17): the whole space of
-//! address, count, lock and state, not samples.
+//! Reads and writes against the table (D1, D2, D15 to D17, D22): every range of addresses, for writes with each lock and
+//! motor state and with some values for all its bytes, and every value of each single register.
 
 use protocol_core::registers::map::{baud_rate, fault, find};
 use protocol_core::registers::map21::find_readable;
@@ -12,7 +12,7 @@ fn row(address: u8) -> Option<&'static Register> {
     MAP.iter().find(|row| row.holds(address))
 }
 
-/// Does a write have an effect at this address? Written from the prose of the protocol, not from the file.
+/// Does a write have an effect at this address? This follows the text of the protocol, not the code of the register file.
 fn takes_effect(address: u8, lock: u8) -> bool {
     row(address).is_some_and(|row| match (row.access, row.region) {
         (Access::ReadWrite, Region::Ram) => true,
@@ -26,12 +26,12 @@ const OUT_OF_RANGE: u8 = 2;
 /// Reason 4 of register 244.
 const HALF_A_WORD: u8 = 4;
 
-/// The low byte of the two-byte register that a byte belongs to.
+/// The address of the low byte of the two-byte register at `address`; `None` if the register there has one byte.
 fn word_of(address: u8) -> Option<u8> {
     matches!(address, 128..=185).then_some(address & !1)
 }
 
-/// The outcome a write should have: all 256 values, or the reason and the register that refuses it.
+/// The outcome that a write should have: all 256 values after it, or the reason and the register of its refusal.
 fn expected(before: &[u8; 256], address: u8, values: &[u8]) -> Result<[u8; 256], (u8, u8)> {
     let lock = before[usize::from(LOCK)];
     let mut after = *before;

@@ -1,5 +1,5 @@
-//! Every write in map 2.1 that there is, against its table (M1 to M6): the whole space of address, count and lock, and
-//! every value of every register.
+//! Writes in map 2.1 against the text of the protocol (M2, M3, M5, M6): every range of addresses with each lock state and with
+//! some values for all its bytes, and every value of each single register.
 
 use protocol_core::registers::map::LAST_REFUSAL;
 use protocol_core::registers::map21::find_readable;
@@ -8,7 +8,7 @@ use protocol_core::registers::{Accepted, Image, Map, RegisterFile};
 const LOCK: u8 = 28;
 const OFFSETS: std::ops::RangeInclusive<u8> = 13..=19;
 
-/// Does a write of function 04 have an effect at this address? Written from the prose of M2, not from the table.
+/// Does a write of function 04 have an effect at this address? This follows the text of M2, not the table.
 fn takes_effect(address: u8, lock: u8) -> bool {
     match address {
         11..=20 => lock == 0,

@@ -1,4 +1,4 @@
-//! Silence on the line, inside a frame or behind one: what the deframer makes of it (D4, D5).
+//! What the deframer does when the line is silent, inside a frame or behind one (D4, D5).
 
 use crate::stream::{self, Event, GAP_US, LONG_SILENCE_US, Received, frame, receive};
 use protocol_core::time::{Duration, Instant};

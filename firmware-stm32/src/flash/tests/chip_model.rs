@@ -31,7 +31,7 @@ pub(super) struct ChipModel {
     pub(super) monitor: RefCell<Option<Comparator>>,
     /// The time from which the monitor is valid.
     pub(super) monitor_settled: u32,
-    /// The model refuses writes.
+    /// True if the model refuses writes.
     pub(super) protected: bool,
     pub(super) erased: Vec<usize>,
     pub(super) fed_at: Vec<u32>,
@@ -75,7 +75,7 @@ impl ChipModel {
         Self { supply, ..Self::new() }
     }
 
-    /// The contents of a cell, past the cache.
+    /// The contents of a cell, read past the cache.
     pub(super) fn cell(&self, offset: usize) -> [u8; WORD] {
         *self.cells.borrow().bytes()[offset..].first_chunk().unwrap()
     }
@@ -88,7 +88,7 @@ impl ChipModel {
         self.control & control::LOCK != 0
     }
 
-    /// The present supply, in millivolts. Its time starts with the model.
+    /// The present supply, in millivolts. The times of `supply` count from [`START`].
     pub(super) fn millivolts(&self) -> u32 {
         self.supply.at(self.micros.get().wrapping_sub(START))
     }
@@ -206,5 +206,5 @@ impl FlashRegisters for ChipModel {
     }
 }
 
-/// Start-up time of the model's supply monitor.
+/// Start-up time of the model's supply monitor. The driver has to wait longer.
 pub(super) const MONITOR_SETTLES_MICROS: u32 = 20;

@@ -12,9 +12,9 @@ pub struct WrongChecksum;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Decoder {
     buffer: heapless::Vec<u8, { Decoder::CAPACITY }>,
-    /// Everything before the head is finished.
+    /// All bytes before the head are finished.
     head: usize,
-    /// A damaged byte came here. No frame continues across it.
+    /// Where the last damaged byte came; 0 without one. No frame continues across it.
     damaged_at: usize,
 }
 

@@ -1,7 +1,7 @@
 //! Random motions without an obstacle, as the writes of a host. `protection/free_motion.rs` runs some seeds, and the
 //! torture program runs others.
 
-/// What a host writes, and the time until it goes on, in milliseconds.
+/// A write of a host, and the time until the next one, in milliseconds.
 pub struct Step {
     pub address: u8,
     pub values: Vec<u8>,
@@ -20,7 +20,7 @@ impl FreeMoves {
     pub fn of(seed: u64, protection: u8) -> Self {
         let mut numbers = Numbers(seed);
         let mut moves = Self { grams: 0, steps: Vec::new() };
-        // A gripper or a suction cup.
+        // Register 30: a gripper or a suction cup.
         let has_gripper = numbers.below(2) == 0;
         moves.write(30, &[u8::from(has_gripper)], 0);
         moves.write(192, &[protection, 70, if numbers.below(2) == 0 { 20 } else { 40 }], 500);
@@ -54,7 +54,7 @@ impl FreeMoves {
     }
 }
 
-/// Small reproducible numbers.
+/// A generator of random numbers that a seed reproduces.
 struct Numbers(u64);
 
 impl Numbers {

@@ -5,10 +5,10 @@ use crate::rig::{Rig, ToServos};
 
 use super::{BLOCKED, LET_GO};
 
-/// Motions in which a joint turns back at full speed, so that its push lasts longest.
+/// Seeds of motions in which a joint reverses at full speed, so that its push lasts longest.
 const TURNS_AT_FULL_SPEED: [u64; 4] = [78, 1111, 3009, 3707];
 
-/// Every frame for the servos during some moves, and the joints that were blocked or let go.
+/// Every frame for the servos during the moves of a seed, and the bits of the joints that were blocked or let go.
 fn frames_of_moves(seed: u64, protection: u8) -> (Vec<(u64, ToServos)>, u8) {
     let mut rig = Rig::started();
     let moves = FreeMoves::of(seed, protection);

@@ -7,7 +7,7 @@ use protocol_core::time::Instant;
 
 use super::{ALARMS, LET_GO, bit, joint};
 
-/// Joint 3 with 100 g, whose servo trips.
+/// An arm that carries 100 g. The servo of joint 3 has tripped. Also returns the angle of joint 3 before, in millidegrees.
 fn tripped(trip: Trip) -> (Rig, i32) {
     let mut rig = Rig::started();
     rig.plant.set_load(100);

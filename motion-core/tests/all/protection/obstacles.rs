@@ -8,12 +8,13 @@ use protocol_core::registers::Joint;
 
 use super::{ALARMS, BLOCKED, LET_GO, bit, joint, stiff_wall, stream};
 
-/// Puts a joint somewhere by hand, while the arm is forceless.
+/// Turns a joint to an angle by hand, while the arm is forceless.
 fn put(rig: &mut Rig, number: u8, degrees: u8) {
     rig.hand(number, counts_from_angle(joint(number), MicroDegrees::from_degrees(degrees), 0));
 }
 
-/// The largest average push of a joint over 100 ms in 0.1 %, while `millis` pass. The joint does not turn.
+/// The largest average push of a joint over 100 ms in 0.1 %, while `millis` pass. The joint must not turn: its load
+/// counts as its push.
 fn largest_average_load(rig: &mut Rig, joint: Joint, millis: usize) -> i32 {
     let mut loads = Vec::new();
     let mut largest = 0;
@@ -91,7 +92,8 @@ fn d27_a_joint_gives_way_also_out_of_the_linkage() {
     rig.run_ms(500);
     rig.write(29, &[1]);
     rig.run_ms(500);
-    // The arm is outside the linkage, so its set-point goes inwards. To give way to the obstacle it has to come back outwards.
+    // The arm is outside the linkage, so the set-point of joint 2 goes inwards. To give way to the obstacle, the set-point has
+    // to come back outwards.
     rig.plant.set_wall(joint(2), stiff_wall(22));
     rig.write(47, &[90]);
     rig.run_ms(1_000);

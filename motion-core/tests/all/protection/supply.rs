@@ -19,7 +19,7 @@ fn d29_an_emergency_stop_is_not_an_order_to_move() {
         let angles = |rig: &Rig| Joint::ALL.map(|joint| rig.plant.angle(joint));
         let before = angles(&rig);
         rig.plant.power_cycle(Instant::from_micros(rig.now_us));
-        // Nobody holds the arm; the servos start after 200 ms.
+        // From now on no hand holds the arm. The servos start after 200 ms.
         Joint::ALL.into_iter().for_each(|joint| rig.plant.let_go(joint));
         rig.forget();
         let mut largest = 0;
@@ -56,7 +56,7 @@ fn d29_a_servo_that_restarted_engages_where_it_is_also_near_its_set_point() {
     let restarted_at = rig.now_us;
     rig.run_ms(1_000);
     assert_eq!((rig.get(LET_GO), rig.plant.torque(joint(2))), (0, Some(Torque::On)));
-    // Before its first answer, only questions are sent to the servo; then a goal, then torque.
+    // Until its first answer, only questions are sent to the servo. The first frame after that is a goal.
     let to_servo = |told: &ToServos| match told {
         ToServos::Goals(goals) => goals.iter().any(|&(id, _)| id == 1),
         ToServos::Torque(codes) => codes[1].is_some(),
@@ -84,8 +84,8 @@ fn d29_an_adapter_that_was_gone_is_no_lost_supply() {
 
 #[test]
 fn d29_an_emergency_stop_is_noticed_also_if_a_servo_was_hot_before_it() {
-    // The joint is turned meanwhile, so its alarm tells with the first answer that nothing holds it. At some of these times it
-    // answers last.
+    // The joint is turned meanwhile, so the alarm in its first answer tells that its servo does not hold it. With some of these
+    // times, this servo answers last.
     for (number, millis) in
         (3_000..3_100).step_by(3).flat_map(|millis| (1..=7).map(move |number| (number, millis)))
     {

@@ -1,4 +1,4 @@
-//! A controller with the simulated servos behind it, a host with literal bytes before it, and time as a number.
+//! A controller between simulated servos and a host that sends literal bytes, in virtual time.
 
 use arm_sim::plant::Plant;
 use motion_core::servo_bus::frame::{Decoder, Instruction, register};
@@ -25,11 +25,11 @@ pub struct Rig {
     pub now_us: u64,
     pub controller: Controller,
     pub plant: Plant,
-    /// How much the host link takes at once.
+    /// How many bytes the host link takes at once.
     pub room: usize,
     pub to_host: Vec<(u64, Vec<u8>)>,
     pub to_servos: Vec<(u64, ToServos)>,
-    /// The questions about the torque of a servo.
+    /// Time and id of each question that asks for the torque switch of a servo.
     pub torque_questions: Vec<(u64, u8)>,
     pub vacuum: Vec<(u64, Vacuum)>,
     pub saved: Vec<Image>,
@@ -37,9 +37,9 @@ pub struct Rig {
     pub storage: Storage,
     /// The id of a servo, and how many of the next frames with a goal for it are lost.
     pub lost_goals: (u8, usize),
-    /// A servo without torque does not show its goal.
+    /// True if a servo without torque does not show its goal.
     pub hides_goals: bool,
-    /// The goals that reached the servos.
+    /// The last goal that reached each servo.
     servo_goals: [Option<u16>; 7],
     /// Each servo that was given torque, with the goal that had reached it and its position.
     pub given_torque: Vec<(u8, Option<u16>, u16)>,
@@ -57,7 +57,7 @@ pub fn config() -> Config {
 }
 
 impl Rig {
-    /// An arm in the moment of power-up.
+    /// An arm at the moment of power-up.
     pub fn new() -> Self {
         Self::with(Plant::new(Instant::ZERO), None, Storage::Ready)
     }
@@ -105,7 +105,7 @@ impl Rig {
         self.controller = Controller::new(self.now(), config(), None, Storage::Ready);
     }
 
-    /// Forgets what came out so far.
+    /// Forgets the recorded frames and vacuum outputs. Saved images and [`Rig::given_torque`] are kept.
     pub fn forget(&mut self) {
         self.to_host.clear();
         self.to_servos.clear();
@@ -194,7 +194,7 @@ impl Rig {
         true
     }
 
-    /// Hands bytes to the controller and lets it act on them without time passing.
+    /// Passes bytes to the controller and lets it act on them. No time passes.
     pub fn send(&mut self, bytes: &[u8]) {
         let mut rest = bytes;
         while !rest.is_empty() {

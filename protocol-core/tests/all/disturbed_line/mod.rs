@@ -26,7 +26,7 @@ pub enum Disturbance {
     LostByte,
     DoubledByte,
     FalseLongHeader,
-    /// Inside good frames.
+    /// Pauses of [`PAUSE_US`] inside good frames.
     Pauses,
     /// No disturbance, and no pause between the frames.
     BackToBack,
@@ -53,7 +53,7 @@ impl Disturbance {
         }
     }
 
-    /// The bytes that it sends in place of the frame `victim`.
+    /// The bytes that the line carries in place of the frame `victim`.
     fn spoil(self, random: &mut Random, mut victim: Vec<u8>) -> Vec<u8> {
         let place = random.index(victim.len());
         match self {
@@ -72,13 +72,13 @@ impl Disturbance {
     }
 }
 
-/// Noise that is rich in headers.
+/// A byte of noise. Bytes of headers are frequent.
 fn noise(random: &mut Random) -> u8 {
     let likely = [0xAA, 0x77, 0xAA, 0x77, 0x06, 0x04, 0x03];
     if random.index(2) == 0 { likely[random.index(likely.len())] } else { random.byte() }
 }
 
-/// A frame like any other. Victims of a disturbance have odd addresses and the rest even ones, so that a victim
+/// A random frame. Victims of a disturbance have odd addresses and the rest even ones, so that a victim
 /// that comes out after all is not mistaken for another frame.
 fn any_frame(random: &mut Random, victim: bool) -> Vec<u8> {
     let data: Vec<u8> = (0..random.index(20)).map(|_| random.byte()).collect();
@@ -128,7 +128,7 @@ struct Line {
     deframer: Deframer<ToArm>,
     now: u64,
     waiting: Vec<Vec<u8>>,
-    /// How many of the burst came out or were lost.
+    /// How many frames of the burst came out or were lost.
     done: usize,
     /// When the last byte of each frame of the burst was through.
     ends: Vec<u64>,
@@ -177,7 +177,8 @@ impl Line {
         received.into_iter().for_each(|said| self.came_out(&said));
     }
 
-    /// A disturbance may let its victim through. The victim is not among the expected frames.
+    /// Counts a frame that came out, and the frames of the burst that it skips as lost. A disturbance may let its victim
+    /// through, which is not among the expected frames and does not count.
     fn came_out(&mut self, said: &Received) {
         let Received::Frame(bytes) = said else { return };
         let Some(skipped) = self.waiting[self.done..].iter().position(|expected| expected == bytes) else {

@@ -15,7 +15,7 @@ use protocol_core::registers::Image;
 
 const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 
-/// The sectors of the reference board.
+/// Bytes of a sector of the reference board.
 pub const REAL: usize = 16_384;
 
 /// The journal's access to a flash that the test inspects, too.
@@ -51,7 +51,7 @@ impl<const SECTOR: usize> NorFlash for Access<'_, SECTOR> {
     }
 }
 
-/// The image with this number: all bytes differ from those of its neighbours.
+/// The image with this number: random bytes, so that it differs from the images with other numbers.
 #[must_use]
 pub fn image(number: u64) -> Image {
     let mut random = Random::new(number);
@@ -73,7 +73,7 @@ pub struct World<const SECTOR: usize> {
     pub flash: RefCell<Flash<SECTOR>>,
     /// What the next start may find.
     possible: Vec<Option<Image>>,
-    /// How many images were saved, or were begun to be saved.
+    /// How many saves were tried: the number of the last image.
     pub images: u64,
     /// Decides how marginal bits read.
     pub seed: u64,
@@ -113,14 +113,14 @@ impl<const SECTOR: usize> World<SECTOR> {
         Self { flash, possible, images: 0, seed: 0, most: (0, 0), past: Vec::new() }
     }
 
-    /// The settings, when there is no doubt.
+    /// What the next start finds. Panics if there are several possibilities.
     #[must_use]
     pub fn settings(&self) -> Option<Image> {
         assert_eq!(self.possible.len(), 1);
         self.possible[0]
     }
 
-    /// One power cycle: a start and some saves.
+    /// Runs a power cycle: a start and `saves` saves, each with its checks. The power is cut as `cut` says.
     pub fn cycle(&mut self, saves: usize, cut: Option<Cut>) -> End {
         self.past.push((saves, cut));
         self.seed = Random::new(self.seed).next();
@@ -144,7 +144,7 @@ impl<const SECTOR: usize> World<SECTOR> {
         End::Quiet
     }
 
-    /// Forgets the past power cycles after a quiet one: only those since then can explain a failure.
+    /// Forgets the past power cycles if the last one was quiet: only later cycles can explain a failure.
     pub fn forget_past(&mut self, end: End) {
         if end == End::Quiet {
             self.past.clear();
@@ -174,7 +174,7 @@ fn check_start<const SECTOR: usize>(flash: &Flash<SECTOR>, most: (usize, usize))
     (most.0.max(erases), most.1.max(programs))
 }
 
-/// Checks what a start found, which is what all later ones have to find.
+/// Checks what a start found. From now on all starts have to find the same.
 fn found(possible: &mut Vec<Option<Image>>, opened: Opened) {
     let settings = opened.image().copied();
     match opened {

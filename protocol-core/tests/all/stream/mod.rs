@@ -1,5 +1,5 @@
 //! Streams for the framing tests: frames built with the `crc` crate, a driver for the deframer, and a
-//! model of what the deframer should do that starts from the whole history every time.
+//! model of the deframer that evaluates the whole history again after every byte.
 
 #![allow(dead_code)] // Each test file uses its part.
 
@@ -9,7 +9,7 @@ use protocol_core::time::{Duration, Instant};
 use protocol_core::wire::{Defect, Deframer, Direction, MAX_LENGTH};
 
 pub const GAP_US: u64 = 2_000;
-/// After this an incomplete frame is abandoned (D4).
+/// After this silence an incomplete frame is abandoned (D4).
 pub const LONG_SILENCE_US: u64 = 100_000;
 const CRC: crc::Crc<u16> = crc::Crc::<u16>::new(&crc::CRC_16_MODBUS);
 
@@ -37,7 +37,8 @@ pub fn raw_frame(function: u8, address: u8, count: u8, data: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// A well-formed frame, as near to `address` as the range allows: a write of `data`, or a read of seven.
+/// A well-formed frame: a write of `data`, or a read of seven registers. It begins at `address`, or lower if its range would
+/// end beyond address 254.
 pub fn frame(function: u8, address: u8, data: &[u8]) -> Vec<u8> {
     let (count, data) = if function == 3 { (7, &[][..]) } else { (u8::try_from(data.len()).unwrap(), data) };
     raw_frame(function, address.min(255 - count), count, data)
@@ -110,7 +111,7 @@ enum Candidate {
 }
 
 impl Model {
-    /// The frames and defects that can be found only after this event.
+    /// The frames and defects that the deframer can find after this event and not before.
     pub fn take(&mut self, event: &Event) -> Vec<Received> {
         match event {
             Event::Bytes(bytes) => {
@@ -145,7 +146,7 @@ impl Model {
         (0..self.history.len()).filter_map(judged).collect()
     }
 
-    /// The length of the history at the next long silence after `at`.
+    /// The length of the history at the next long silence after `at`; `None` if there is none.
     fn cut_behind(&self, at: usize) -> Option<usize> {
         self.long.iter().copied().find(|&cut| cut > at)
     }
