@@ -96,7 +96,7 @@ impl SelfTest {
                 b'h' => cortex_m::asm::udf(),
                 b'o' => drop(overflow(0)),
                 b'w' => self.hang(),
-                _ => say!(self, "a board, b echoes, c one servo, d seven servos, e ends"),
+                _ => say!(self, "a board, b echoes, c one servo, d seven servos, e crashes"),
             }
         }
     }

@@ -60,7 +60,7 @@ pub struct Options {
     #[arg(long, value_name = "PATH", conflicts_with_all = ["servos", "servos_only", "servo_socket"])]
     pub control: Option<PathBuf>,
 
-    /// Let virtual time stand while the client thinks: see LOCKSTEP below. MS is a timeout in real time
+    /// Stop virtual time while the client computes: see LOCKSTEP below. MS is a timeout in real time
     #[arg(long, value_name = "MS", value_parser = clap::value_parser!(u32).range(1..=86_400_000),
           conflicts_with_all = ["arms", "servos", "servos_only", "servo_socket"])]
     pub lockstep: Option<u32>,
@@ -111,7 +111,7 @@ pub struct Options {
     #[arg(long, value_name = "PORT", conflicts_with_all = ["arms", "faults", "servo_socket"])]
     pub servos: Option<PathBuf>,
 
-    /// With --servos: how many milliseconds later than on the wire an answer may arrive
+    /// With --servos: how much later than on the wire an answer may arrive, in milliseconds
     #[arg(long, value_name = "MS", default_value_t = 40, requires = "servos", value_parser = clap::value_parser!(u16).range(0..=1_000))]
     pub usb_timeout: u16,
 

@@ -25,7 +25,7 @@ pub(crate) enum Failure {
         "--fault {0}: without a controller there is no host line and no flash: see FAULTS in host-sim --help"
     )]
     FaultOfController(ArmFault),
-    #[error("no pseudo-terminal: {0}: see that /dev/pts is mounted and has not run out, nor 'ulimit -n'")]
+    #[error("no pseudo-terminal: {0}: is /dev/pts mounted, and does 'ulimit -n' allow more files?")]
     Port(io::Error),
     #[error(transparent)]
     Session(#[from] SessionFileError),

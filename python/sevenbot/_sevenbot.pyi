@@ -133,7 +133,7 @@ def inverse(
     """The angles of joints 1 to 5 in degrees that bring the tip to x, y, z in millimetres, with the tool in this direction, by
     default straight down: inverse kinematics. With numpy an array.
 
-    Raises `OutOfReach` with the nearest point within reach. Knows no table and no base: `Arm.move_to` does.
+    Raises `OutOfReach` with the nearest point within reach. It ignores the table and the base, which `Arm.move_to` avoids.
     """
 def limits() -> tuple[NDArray[float64], NDArray[float64]]:
     """The smallest and the largest angles of joints 1 to 7 in degrees: two arrays with numpy, or tuples.
@@ -143,7 +143,7 @@ def limits() -> tuple[NDArray[float64], NDArray[float64]]:
 def model(format: Literal["urdf", "mjcf"]) -> str:
     """The model of the arm for other programs, as text: `"urdf"`, or `"mjcf"` for MuJoCo, where the parallelogram is a closed loop.
 
-    It is that of `sevenbot model`. Lengths are metres and angles radians; a joint's angle is that of the registers less 90, 90, 65,
+    The same as `sevenbot model`. Lengths are metres and angles radians; a joint's angle is the register's angle less 90, 90, 65,
     90, 90, 90 degrees. The claw, joint 7, is left out.
     """
 def ports(baud: int = 115200) -> list[tuple[str, str, int, str, str]]:
@@ -158,7 +158,7 @@ class Arm:
     """A 7Bot V2 arm.
 
     `Arm("/dev/ttyUSB0")` opens a port, `Arm("tcp://HOST:PORT", token="...")` connects to a server, `Arm()` opens the only port with
-    an arm that answers, `Arm(id=5)` that of the arm with this number (register 11), `Arm(chip="...")` that with this `chip_id`,
+    an arm that answers, `Arm(id=5)` the one of the arm with this number (register 11), `Arm(chip="...")` the one with this `chip_id`,
     and `Arm.simulated()` is an arm in virtual time. All have the same methods. `with Arm() as arm:` stops what moves at the
     end, as `stop()`, and closes the port.
 
@@ -501,7 +501,7 @@ class SimulatedArms:
     """Simulated arms that step together, for learning: `seen = arms.step(actions, 0.02)`, with an action of seven angles in degrees
     for each arm.
 
-    `seen` is an array of a row for each arm. The slices `POSITIONS`, `VELOCITIES`, `LOADS`, `TIP`, `BLOCKED` and `AGE` name its
+    `seen` is an array with a row for each arm. The slices `POSITIONS`, `VELOCITIES`, `LOADS`, `TIP`, `BLOCKED` and `AGE` name its
     columns: `seen[:, arms.TIP]`. Each arm is a controller that parses frames and answers a read, with servos, virtual time,
     faults and a load of its own. Its line takes no time. The results do not depend on the number of threads. `exchange` lets
     another simulation move the joints.
@@ -532,7 +532,7 @@ class SimulatedArms:
         """Sends each arm its action, the next set-point of seven angles of 0 to 180 degrees, lets `dt` pass, and reads its state.
 
         `actions` is an array (n, 7); arrays of float32 and float64 without gaps are not copied. With `None` the arms go on.
-        `dt` is 0.005 to 1 second in whole milliseconds. Returns `out`, or a new array (n, 32), of float32 if the actions are.
+        `dt` is 0.005 to 1 second in whole milliseconds. Returns `out`, or a new array (n, 32), which is float32 if the actions are.
         A wrong action raises `ValueError` before any arm moves. Ctrl-C ends the call after the step.
         """
     @overload
@@ -1012,7 +1012,7 @@ class Simulation:
     @property
     def scene(self) -> str | None:
         """What stands on the table, as text: `"cube red 30 40 0 200; cylinder can 40 60 100 -80 200"`. docs/simulation.md describes it.
-        `None` is no table. Setting it puts everything in its place.
+        `None`: there is no table. Setting it puts all things in their places.
         """
     @scene.setter
     def scene(self, value: str | None, /) -> None: ...
@@ -1036,9 +1036,9 @@ class Simulation:
 
 @final
 class SimulationSnapshot:
-    """A simulated arm at one instant: servos, registers, settings and time. Equal if all of it is equal.
+    """A simulated arm at one instant: servos, registers, settings and time. Two are equal if all of their state is equal.
 
-    `pickle` keeps it for the same version of this package. As any pickle, load it only if you trust where it is from.
+    `pickle` keeps it for the same version of this package. As any pickle, load it only if you trust its source.
     """
 
     @staticmethod

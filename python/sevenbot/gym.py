@@ -231,8 +231,8 @@ class _ArmVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
     ) -> tuple[Floats, dict[str, Any]]:
         """Begins an episode of each arm. `options={"goals": array}` sets the goals, (n, 3) in millimetres.
 
-        All arms draw from one seed. With a list of n seeds each arm draws from its own, as one environment does; `None` in it is
-        a random seed. Without a seed the random numbers go on.
+        All arms draw from one seed. With a list of n seeds each arm draws what a single environment with that seed draws; `None`
+        in the list is a random seed. Without a seed the random numbers go on.
         """
         if isinstance(seed, (int, np.integer)):
             super().reset(seed=int(seed))

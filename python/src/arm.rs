@@ -30,7 +30,7 @@ mod calls;
 /// A 7Bot V2 arm.
 ///
 /// `Arm("/dev/ttyUSB0")` opens a port, `Arm("tcp://HOST:PORT", token="...")` connects to a server, `Arm()` opens the only port with
-/// an arm that answers, `Arm(id=5)` that of the arm with this number (register 11), `Arm(chip="...")` that with this `chip_id`,
+/// an arm that answers, `Arm(id=5)` the one of the arm with this number (register 11), `Arm(chip="...")` the one with this `chip_id`,
 /// and `Arm.simulated()` is an arm in virtual time. All have the same methods. `with Arm() as arm:` stops what moves at the
 /// end, as `stop()`, and closes the port.
 ///

@@ -32,7 +32,7 @@ const ARM_BYTES: usize = 20_000;
 /// Simulated arms that step together, for learning: `seen = arms.step(actions, 0.02)`, with an action of seven angles in degrees
 /// for each arm.
 ///
-/// `seen` is an array of a row for each arm. The slices `POSITIONS`, `VELOCITIES`, `LOADS`, `TIP`, `BLOCKED` and `AGE` name its
+/// `seen` is an array with a row for each arm. The slices `POSITIONS`, `VELOCITIES`, `LOADS`, `TIP`, `BLOCKED` and `AGE` name its
 /// columns: `seen[:, arms.TIP]`. Each arm is a controller that parses frames and answers a read, with servos, virtual time,
 /// faults and a load of its own. Its line takes no time. The results do not depend on the number of threads. `exchange` lets
 /// another simulation move the joints.
@@ -160,7 +160,7 @@ impl SimulatedArms {
     /// Sends each arm its action, the next set-point of seven angles of 0 to 180 degrees, lets `dt` pass, and reads its state.
     ///
     /// `actions` is an array (n, 7); arrays of float32 and float64 without gaps are not copied. With `None` the arms go on.
-    /// `dt` is 0.005 to 1 second in whole milliseconds. Returns `out`, or a new array (n, 32), of float32 if the actions are.
+    /// `dt` is 0.005 to 1 second in whole milliseconds. Returns `out`, or a new array (n, 32), which is float32 if the actions are.
     /// A wrong action raises `ValueError` before any arm moves. Ctrl-C ends the call after the step.
     #[pyo3(signature = (actions, dt = 0.02, out = None))]
     fn step<'py>(

@@ -21,7 +21,7 @@ pub(crate) fn forward(py: Python<'_>, angles: &Bound<'_, PyTuple>) -> PyResult<T
 /// The angles of joints 1 to 5 in degrees that bring the tip to x, y, z in millimetres, with the tool in this direction, by
 /// default straight down: inverse kinematics. With numpy an array.
 ///
-/// Raises `OutOfReach` with the nearest point within reach. Knows no table and no base: `Arm.move_to` does.
+/// Raises `OutOfReach` with the nearest point within reach. It ignores the table and the base, which `Arm.move_to` avoids.
 #[pyfunction]
 #[pyo3(signature = (x, y, z, *, tool = None))]
 pub(crate) fn inverse(
@@ -46,7 +46,7 @@ pub(crate) fn limits(py: Python<'_>) -> PyResult<(Bound<'_, PyAny>, Bound<'_, Py
 
 /// The model of the arm for other programs, as text: `"urdf"`, or `"mjcf"` for MuJoCo, where the parallelogram is a closed loop.
 ///
-/// It is that of `sevenbot model`. Lengths are metres and angles radians; a joint's angle is that of the registers less 90, 90, 65,
+/// The same as `sevenbot model`. Lengths are metres and angles radians; a joint's angle is the register's angle less 90, 90, 65,
 /// 90, 90, 90 degrees. The claw, joint 7, is left out.
 #[pyfunction]
 pub(crate) fn model(py: Python<'_>, format: &str) -> PyResult<String> {

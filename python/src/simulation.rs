@@ -35,9 +35,9 @@ pub(crate) struct Simulation {
     process: u32,
 }
 
-/// A simulated arm at one instant: servos, registers, settings and time. Equal if all of it is equal.
+/// A simulated arm at one instant: servos, registers, settings and time. Two are equal if all of their state is equal.
 ///
-/// `pickle` keeps it for the same version of this package. As any pickle, load it only if you trust where it is from.
+/// `pickle` keeps it for the same version of this package. As any pickle, load it only if you trust its source.
 #[pyclass(frozen, module = "sevenbot")]
 pub(crate) struct SimulationSnapshot(Mutex<arm_sim::Simulation>);
 
@@ -218,7 +218,7 @@ impl Simulation {
     }
 
     /// What stands on the table, as text: `"cube red 30 40 0 200; cylinder can 40 60 100 -80 200"`. docs/simulation.md describes it.
-    /// `None` is no table. Setting it puts everything in its place.
+    /// `None`: there is no table. Setting it puts all things in their places.
     #[getter]
     fn scene(&self, py: Python<'_>) -> PyResult<Option<String>> {
         let scene =

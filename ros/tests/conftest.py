@@ -65,8 +65,8 @@ class Start:
         self._environment = os.environ | {"ROS_DOMAIN_ID": str(domain), "PYTHONPATH": path}
 
     def program(self, words: list[str]) -> Program:
-        self._count += 1
         """Any program, in the domain of the test."""
+        self._count += 1
         program = Program(words, self._folder / f"{self._count}.log", self._environment)
         self._stack.callback(program.end)
         return program

@@ -8,7 +8,7 @@ use sevenbot::approach::ApproachRule;
 /// The option of the approach.
 #[derive(Clone, Copy, Debug, Default, Args)]
 pub(crate) struct ApproachArgs {
-    /// Go smoothly to the first point in this time first, 0.1 to 60 s, or longer where a joint would exceed its speed.
+    /// First go smoothly to the first point, in this time: 0.1 to 60 s, or longer where a joint would exceed its speed.
     /// Without it a first point further than 5 degrees from where a joint stands is refused.
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     approach: Option<f64>,

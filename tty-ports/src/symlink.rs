@@ -38,7 +38,7 @@ pub enum SymlinkError {
     /// The path is a symbolic link to something that does not exist and is not a pseudo-terminal. So [`Symlink`] did not
     /// create it.
     #[error(
-        "{}: that link to {} is not one to a port of a simulator, so it is not replaced: remove it, or choose another path",
+        "{}: this link leads to {}, not to a pseudo-terminal, so it is not replaced: remove it, or choose another path",
         path.display(), target.display()
     )]
     Foreign {

@@ -21,7 +21,6 @@ mod lerobot;
 mod modules;
 mod mujoco;
 mod no_panic;
-mod obstacles;
 mod peers;
 mod python;
 mod registers_md;
@@ -29,7 +28,6 @@ mod replays;
 mod ros;
 mod ros_model;
 mod run;
-mod sag;
 mod size;
 mod start_up;
 mod steps;
@@ -65,8 +63,8 @@ enum Task {
     },
     /// Search for faults: simulated worlds, a disturbed line, power cuts, fuzzing.
     ///
-    /// Prints one table: trials, their number, failures and seeds. A seed reproduces its worlds. The time determines their
-    /// number.
+    /// Prints one table: trials, their number, failures and seeds. A seed reproduces its worlds. The time determines how
+    /// many run.
     Torture(torture::TortureArgs),
     /// Record random sessions with a simulated arm natively and in a WebAssembly module, compare them, and replay them
     Replays,
@@ -117,7 +115,7 @@ enum Task {
     Emulate(emulator::EmulateArgs),
     /// Measure how far the emulated arm sags during restarts, a panic, noise and a silent servo
     Sag,
-    /// Measure what becomes of the emulated arm at walls, after emergency stops, and with a thing in its gripper (seven minutes)
+    /// Measure how the emulated arm behaves at walls, after emergency stops, and with a thing in its gripper (seven minutes)
     Obstacles,
 }
 
@@ -162,8 +160,8 @@ fn run_task(task: &Task) -> TaskResult {
         Task::Count(Accept { accept }) => count::check(*accept),
         Task::Coverage => coverage::check(),
         Task::Emulate(options) => emulate(options),
-        Task::Sag => sag::measure(),
-        Task::Obstacles => obstacles::measure(),
+        Task::Sag => run::experiment("sag"),
+        Task::Obstacles => run::experiment("obstacles"),
         Task::Bench(options) => peers::run(options),
     }
 }

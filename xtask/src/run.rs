@@ -77,6 +77,12 @@ pub(crate) fn build_image() -> TaskResult {
     cargo("fw --quiet")
 }
 
+/// Builds the image, and runs an example of the crate `emulator` that measures it.
+pub(crate) fn experiment(name: &str) -> TaskResult {
+    build_image()?;
+    cargo(&format!("run --quiet -p emulator --example {name}"))
+}
+
 /// Builds the simulator, with one of its tests: cargo then selects features as for all tests.
 pub(crate) fn build_host_sim() -> TaskResult {
     cargo(&format!("test --quiet {TESTED} --test simulator --no-run"))

@@ -56,7 +56,7 @@ class SevenbotConfig(RobotConfig):
 class SevenbotLeaderConfig(TeleoperatorConfig):
     """The leader: an arm without torque that you move by hand."""
 
-    # As that of the follower. `sim` is a simulated arm that a simulated hand leads.
+    # As `port` of the follower. `sim` is a simulated arm that a simulated hand leads.
     port: str | None = None
     # At the end hold, then go to the park pose and switch the motors to damping. False: hold where the arm is.
     park_on_disconnect: bool = True

@@ -24,8 +24,8 @@ SILENT = ("no answer", "no servo answers")
 class SevenbotLeader(Device, Teleoperator):
     """A 7Bot V2 arm, real or simulated, whose measured positions are actions.
 
-    They have the keys and scales of the robot `sevenbot`, and are within its limits: so a dataset has the actions that the
-    follower carries out.
+    The actions have the keys and scales of the robot `sevenbot`, and are within its limits. So a dataset has the actions that
+    the follower carries out.
     """
 
     config_class = SevenbotLeaderConfig

@@ -31,8 +31,8 @@ const CODE_LENGTH: std::ops::RangeInclusive<usize> = 6..=32;
 #[command(after_help = "\
 Without --listen only browsers of this computer can join. With it, the laptops
 in the room open the printed address, and type the class code, which is another
-one each time. Write both on the board. Do not pass on the second address: who
-has it can stop all arms and give the real one away.
+one each time. Write both on the board. Do not pass on the second address: with
+it anyone can stop all arms and give the real one away.
 
 The pages pass the network unencrypted with --unencrypted: who can listen there
 learns the class code, and can join. The teacher's address stays in this

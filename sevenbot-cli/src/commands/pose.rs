@@ -47,8 +47,8 @@ at once. A later move without --speed and --time keeps them, and a note says so.
 After Ctrl-C the arm holds its position.
 
 Exit status 1 if the arm did not take the pose, or with --wait did not reach it.
-If that is unknown, a message says that the arm may be moving; exit status 3 if
-the connection is lost. A joint that does not answer or has let go takes no
+If the outcome is unknown, a message says that the arm may be moving. Exit status
+3 if the connection is lost. A joint that does not answer or has let go takes no
 pose: nothing is sent then, and the message tells what to do. With --wait a
 joint that is blocked on its way ends the wait.")]
 pub(crate) struct PoseArgs {

@@ -16,7 +16,7 @@ pub enum StartError {
     Symlink(#[from] SymlinkError),
     /// The system has no pseudo-terminal.
     #[cfg(target_os = "linux")]
-    #[error("no pseudo-terminal: {0}: see that /dev/pts is mounted and has not run out, nor 'ulimit -n'")]
+    #[error("no pseudo-terminal: {0}: is /dev/pts mounted, and does 'ulimit -n' allow more files?")]
     Pty(io::Error),
     /// Pseudo-terminals are for Linux.
     #[cfg(not(target_os = "linux"))]

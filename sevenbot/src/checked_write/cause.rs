@@ -187,9 +187,7 @@ impl fmt::Display for MismatchCause {
 impl fmt::Display for ServerReason {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         out.write_str(match self {
-            Self::ReadOnly => {
-                "the server was started with --read-only, so nobody can change the arm through it"
-            }
+            Self::ReadOnly => "the server was started with --read-only: it passes no writes to the arm",
             Self::Stopped => "another program stopped the arm; pause for a second, then try again",
             Self::AnotherDrives => {
                 "the server lets one program move the arm at a time, and another one does now"

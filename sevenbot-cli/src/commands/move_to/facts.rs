@@ -14,7 +14,7 @@ use crate::printer::Printable;
 #[derive(Debug, Serialize)]
 pub(super) struct TipArrival {
     asked_mm: [f64; 3],
-    /// The requested direction of the tool, of any length.
+    /// The requested direction of the tool, of length 1.
     tool: [f64; 3],
     /// Joints 1 to 5.
     targets_degrees: TargetDegrees,
@@ -65,7 +65,7 @@ impl TipArrival {
     pub(super) fn planned(tip: Vector, target: &TipTarget, direction: Vector) -> Self {
         Self {
             asked_mm: components(tip, 100.0),
-            tool: components(direction, 10_000.0),
+            tool: components(direction.unit().unwrap_or(direction), 10_000.0),
             targets_degrees: TargetDegrees::Whole(target.degrees),
             planned_mm: components(target.reached.tip, 100.0),
             planned_miss_mm: rounded(target.miss_mm),

@@ -300,7 +300,7 @@ fn everybody_can_stop_the_arm_and_who_has_it_can_go_on() {
     drive(&mut frames, 170);
     // A newer session of the same pupil takes the arm over.
     let mut newer = class.frames(&mia.key).expect("accepted");
-    wait_for("the older one ends", || match frames.read() {
+    wait_for("the older one crashes", || match frames.read() {
         Err(_) => Ok(()),
         Ok(message) => Err(format!("{message:?}")),
     });

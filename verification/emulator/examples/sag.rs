@@ -1,12 +1,15 @@
-//! `cargo xtask sag`: measures how far the arm sags during a failure, with the image in the emulator as the controller.
+//! Measures how far the arm sags during a failure, with the image in the emulator as the controller: `cargo xtask sag` builds
+//! the image and runs this.
 //!
-//! The failures and the table are the same as in `torture sag`. This task measures in real time, so a busy machine
-//! increases the figures.
+//! The failures and the table are the same as in `torture sag`. The measurement takes real time, so a busy machine increases
+//! the figures.
 
 use arm_sim::plant::Plant;
 use arm_sim::servo::ServoFault;
+use emulator::chip_program::IMAGE;
 use emulator::emulated_arm::EmulatedArm;
 use emulator::need_qemu;
+use emulator::process::TaskResult;
 use linked_image::Program;
 use protocol_core::registers::map::TARGET_POSITION;
 use protocol_core::registers::{JOINTS, Joint};
@@ -17,17 +20,13 @@ use torture::sag::{
 };
 use torture::seeded_rng::SeededRng;
 
-use crate::run::{self, TaskResult};
-
 /// The period of the noise.
 const NOISE_PERIOD: Duration = Duration::from_millis(1);
 /// The symbol of the panic handler.
 const PANIC_HANDLER: &str = "rust_begin_unwind";
 
-/// Builds the image, measures the sag for each failure and prints the table.
-pub(crate) fn measure() -> TaskResult {
+fn main() -> TaskResult {
     need_qemu()?;
-    run::build_image()?;
     let sags: TaskResult<Vec<_>> =
         SagCause::ALL.into_iter().map(|cause| Ok((cause, sag_over(cause)?))).collect();
     println!("{}", SagTable(sags?));
@@ -112,7 +111,7 @@ fn angles(plant: &Plant) -> [i32; JOINTS] {
 
 /// The address of the panic handler.
 fn panic_handler() -> TaskResult<u32> {
-    let file = run::IMAGE.read()?;
+    let file = IMAGE.read()?;
     let program = Program::read(&file)?;
     let handler = program.functions().find(|function| function.name.contains(PANIC_HANDLER));
     Ok(u32::try_from(handler.ok_or("the image has no panic handler")?.address)?)

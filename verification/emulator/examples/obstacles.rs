@@ -1,4 +1,5 @@
-//! `cargo xtask obstacles`: how the arm behaves at obstacles, with the image in the emulator as the controller.
+//! Measures how the arm behaves at obstacles, with the image in the emulator as the controller: `cargo xtask obstacles` builds
+//! the image and runs this.
 //!
 //! It makes a few of the experiments of `torture obstacles`, and prints the same tables. The experiments run in real time, so a
 //! busy machine increases the figures.
@@ -8,19 +9,16 @@ use std::error::Error;
 use arm_sim::plant::Plant;
 use emulator::emulated_arm::EmulatedArm;
 use emulator::need_qemu;
+use emulator::process::TaskResult;
 use protocol_core::request::Request;
 use protocol_core::time::{Duration, Instant};
 use torture::obstacles::{Experiments, ObstacleArm};
 
-use crate::run::{self, TaskResult};
-
 /// A step of an experiment.
 const STEP: Duration = Duration::from_millis(1);
 
-/// Builds the image, makes the experiments and prints their tables.
-pub(crate) fn measure() -> TaskResult {
+fn main() -> TaskResult {
     need_qemu()?;
-    run::build_image()?;
     println!("{}", Experiments::few().measure::<Arm>()?);
     Ok(())
 }
