@@ -15,8 +15,8 @@ use protocol_core::time::Instant;
 use crate::event::RequestId;
 use crate::span::Span;
 
-/// At most this many reads that were given up are remembered: as many as are sent in some ten seconds without a reply.
-/// No reply is later than that.
+/// At most this many attempts of reads that were given up are remembered. A silent arm is asked up to ten times a second, so
+/// they cover six seconds.
 const REMEMBERED: usize = 64;
 
 /// A read that was sent.

@@ -1,5 +1,5 @@
-//! Detects interruptions that end a park or a program although the arm has no fault: a stop by another program, and a pause of
-//! the page.
+//! Detects what ends a park or a program of blocks although the arm has no fault: a stop by another client of the server, and a
+//! pause of the page.
 //!
 //! A server counts the stops in its registers. Parks and programs decide when to check.
 

@@ -43,7 +43,7 @@ impl Mood {
 pub enum Answers {
     /// It has not answered yet.
     NotYet,
-    /// It answers.
+    /// It answers, except for at most two rounds of reads in a row.
     Yes,
     /// It answered before, but does not answer now.
     NoLonger,

@@ -32,7 +32,7 @@ const STUCK_OUTPUT: usize = 1_024;
 /// Bytes of replies that may be on their way. One read is always allowed.
 const WINDOW: usize = 96;
 
-/// The registers of a report of map 2.2 ([D26](protocol_core::decisions#d26)).
+/// The ranges of the reports of map 2.2 ([D26](protocol_core::decisions#d26)).
 const REPORTS: &[Span] =
     &[Span::of(&PRESENT_POSITION), Span::of(&FINE_POSITION), Span::between(&FINE_POSITION, &LOAD)];
 

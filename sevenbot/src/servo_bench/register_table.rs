@@ -53,7 +53,7 @@ impl RowSource {
 /// One register of a servo.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ServoRegister {
-    /// The name, as in Feetech's table, in lower case with dashes.
+    /// The name in lower case with dashes, such as `min-position`.
     pub name: &'static str,
     /// The address of the first byte.
     pub address: u8,

@@ -58,7 +58,7 @@ impl Drop for ClassSocket {
         self.socket.set_onopen(None);
         self.socket.set_onmessage(None);
         self.socket.set_onclose(None);
-        // Ignore the error of a socket that is closed already.
+        // Without a code and a reason it cannot fail.
         let _ = self.socket.close();
     }
 }

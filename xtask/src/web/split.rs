@@ -122,7 +122,7 @@ fn function_table(module: &Module) -> TaskResult<TableId> {
     Ok(module.tables.main_function_table()?.ok_or("the module has no table of functions")?)
 }
 
-/// Which functions belong to the rest: all that the roots do not reach without calling a function of [`LATER`].
+/// Which functions belong to the rest: those of [`LATER`], and those that the roots reach only through them or not at all.
 fn later(module: &Module) -> Vec<bool> {
     let is_seed = |id: &FunctionId| {
         let function = module.funcs.get(*id);

@@ -4,7 +4,7 @@ use crate::playback::MAX_SEGMENT;
 use crate::units::Angle;
 
 const STANDARD: [u8; 7] = [90, 90, 65, 90, 90, 90, 80];
-/// The maker's example, with the tool down.
+/// The angles of the maker's example of IK6; the tool points down.
 const AT_WORK: [u8; 7] = [105, 88, 110, 90, 135, 30, 40];
 
 fn request(start: [u8; 7], [x, y, z]: [f64; 3], tool: Vector, speed: f64) -> StraightLineRequest {

@@ -1,4 +1,4 @@
-//! Programs of blocks: every kind of block, stops, what is kept, files and links.
+//! Programs of blocks: every kind of block, stops, reloads of the page, files and links.
 
 use std::path::{Path, PathBuf};
 

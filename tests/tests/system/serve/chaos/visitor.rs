@@ -20,7 +20,7 @@ use crate::serve::line_history::LineHistory;
 const LOST: Duration = Duration::from_secs(30);
 /// A reply is lost after this time even if other frames come: reports, and replies to an earlier program.
 const LONGEST: Duration = Duration::from_secs(120);
-/// A reply that an outage took does not come any more after this time.
+/// If there was an outage during a request, its reply is lost when it has not come within this time of the request.
 const AFTER_OUTAGE: Duration = Duration::from_secs(1);
 /// Programs that have a register of their own, from [`SPEED`] on.
 const OWNERS: u8 = 14;
