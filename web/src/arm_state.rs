@@ -30,7 +30,7 @@ pub struct ArmState {
     pub loads: [f32; 7],
     /// Register 29: 0 damping, 1 servo, 2 forceless.
     pub motor_state: u8,
-    /// Register 241.
+    /// Register 241: the fault bits. 0 from an arm without the status block.
     pub faults: u8,
     /// Register 242: the joints whose servos do not answer, bit n-1 for joint n.
     pub missing: u8,

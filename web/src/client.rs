@@ -20,8 +20,8 @@ use sevenbot::{Snapshot, Span};
 use crate::arm_state::ArmState;
 use crate::stop::{Stop, StopProgress, hold_frames};
 
-/// Two attempts of 200 ms: a read without a reply is lost after 400 ms. At 115,200 baud and through a server, a reply takes about
-/// a tenth of that.
+/// Two attempts of 200 ms: a read without a reply is lost after 400 ms. This is about ten times as long as a reply takes at
+/// 115,200 baud and through a server.
 const PATIENCE: Patience = Patience { attempts: 2, timeout: Duration::from_millis(200) };
 /// The arm counts as disconnected after this many consecutive rounds in which a reply was lost.
 const LOST_ROUNDS: u32 = 3;

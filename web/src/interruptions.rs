@@ -12,7 +12,8 @@ use sevenbot::Snapshot;
 use crate::movement::PlayFailure;
 use crate::stop::since_start;
 
-/// A longer pause of the page ends a park or a program: a person may rely on an arm that has stopped meanwhile.
+/// A longer pause of the page ends a park or a program: the arm may have stopped meanwhile, and a person beside it may not expect
+/// that it moves again.
 const LONGEST_PAUSE: Duration = Duration::from_secs(1);
 /// After a write, wait until this many rounds are complete: the reads of the current round may be older than the write, the
 /// reads of the next round are not.
@@ -34,8 +35,8 @@ impl Interruptions {
         if pause > LONGEST_PAUSE { Err(PlayFailure::Paused(pause)) } else { Ok(()) }
     }
 
-    /// Fails if another program has stopped the arm since the first call. The server reports that it drops the targets of this
-    /// client (`is_stopped`), or its count of stops has changed.
+    /// Fails if another client has stopped the arm: the server reports that it drops the targets of this client (`is_stopped`),
+    /// or its count of stops has changed since the first call.
     pub(crate) fn check_stops(&mut self, registers: &Snapshot) -> Result<(), PlayFailure> {
         let sharing = SharingState::of(registers);
         let stops = sharing.map(|sharing| sharing.stops);

@@ -23,8 +23,8 @@ use crate::client::{BAUD, Client};
 use crate::confirmed::{Confirmed, NotTaken, write_all};
 use crate::stop::since_start;
 
-/// Time between two points of a played movement, in milliseconds. A browser calls the page every 17 ms. So the points deviate
-/// from an even grid by less than the quarter of a period that D23 allows.
+/// Time between two points of a played movement, in milliseconds. A browser calls the page every 17 ms, so a point is sent up to
+/// 17 ms late. This is within 8.5 ms of an even grid; D23 allows a quarter of the period, 12.5 ms.
 const PERIOD_MS: u16 = 50;
 const PERIOD: Duration = Duration::from_millis(50);
 /// The host-link watchdog: the arm holds if the page sends nothing for 500 ms while it plays. In units of 10 ms (D24).
@@ -53,7 +53,7 @@ pub enum PlayProgress {
     Failed(PlayFailure),
 }
 
-/// Why a movement ends early.
+/// Why a movement, a park or a program ends early.
 #[derive(Clone, Debug, PartialEq)]
 pub enum PlayFailure {
     /// The arm reports a problem, is not driven, or does not answer.
@@ -62,9 +62,9 @@ pub enum PlayFailure {
     Paused(Duration),
     /// The arm does not take written registers.
     NotTaken,
-    /// These joints have not reached the last pose: joint, position and target in degrees.
+    /// These joints have not reached their targets: joint, position and target in degrees.
     NotReached(Vec<(Joint, u8, u8)>),
-    /// Another program has stopped the arm.
+    /// Another client of the server has stopped the arm.
     StoppedByAnother,
 }
 
@@ -74,7 +74,7 @@ impl From<NotTaken> for PlayFailure {
     }
 }
 
-/// Tells a server that a new movement, park or program begins, so that an earlier stop by another program does not end it.
+/// Tells a server that a new movement, park or program begins, so that an earlier stop by another client does not end it.
 /// Writes nothing without a server.
 pub(crate) fn start_anew(now: Instant, client: &mut Client) {
     if SharingState::of(client.registers()).is_some() {
@@ -100,7 +100,7 @@ pub struct Player {
     recording: Recording,
     /// The path to the first moment.
     approach: Approach,
-    /// An earlier stop by another program does not end this movement: see [`start_anew`].
+    /// An earlier stop by another client does not end this movement: see [`start_anew`].
     starts_anew: bool,
     is_fine: bool,
     /// The registers before the movement, with the speeds and times to restore.
@@ -108,7 +108,7 @@ pub struct Player {
     watch: MoveWatch,
     /// The round of the last registers that were checked.
     watched_round: u64,
-    /// A fault that a stop by another program may have caused: the registers of the arm may show the effect of the stop one round
+    /// A fault that a stop by another client may have caused: the registers of the arm may show the effect of the stop one round
     /// before the server reports the stop.
     suspected: Option<MoveFault>,
     stage: Stage,
@@ -134,7 +134,7 @@ impl Player {
         Ok(Self { starts_anew: true, ..player })
     }
 
-    /// As [`Self::new`], for a part of a program: also a stop by another program before the first point ends it.
+    /// As [`Self::new`], for a line in a program of blocks: a stop by another client ends it, even a stop before the line.
     ///
     /// # Errors
     /// A joint cannot follow the recording at its speed, or `rule` does not allow the distance to the first pose.
@@ -257,7 +257,7 @@ impl Player {
         Ok(PlayProgress::Playing)
     }
 
-    /// Fails if the arm does not carry out the movement, or another program has stopped it.
+    /// Fails if the arm does not carry out the movement, or another client has stopped the arm.
     fn watch(&mut self, now: Instant, client: &Client) -> Result<(), PlayFailure> {
         if client.rounds() != self.watched_round {
             self.watched_round = client.rounds();
@@ -306,8 +306,8 @@ impl Player {
         MovementRun::in_steps(way, now)
     }
 
-    /// Creates the run of the movement. With the extended block, its points determine the speed, so this also sets the speed
-    /// registers to the maximum.
+    /// Creates the run of the movement. On an arm with the extended block, the points determine the speed, so this also sets the
+    /// speed registers to the maximum.
     fn path(&self, now: Instant, client: &mut Client) -> MovementRun {
         if !self.is_fine {
             return MovementRun::in_steps(playback::steps(&self.recording, 1.0), since_start(now));

@@ -27,7 +27,7 @@ const SPEED_STEPS: u8 = 10;
 const ARRIVED: f32 = 3.0;
 /// A joint that moves by more than this after it was let go has sunk, in degrees.
 const STAYS: f32 = 2.0;
-/// The longest time for each part of the path. A turn of 180 degrees takes 10 s.
+/// The longest time for each part of the path. A turn of 180 degrees takes about 10 s.
 const LONGEST_MOVE: Duration = Duration::from_micros(20_000_000);
 /// The arm has to stay in its pose for this time after it was let go.
 const WATCH_TIME: Duration = Duration::from_micros(2_000_000);
@@ -50,7 +50,7 @@ pub enum ParkFailure {
     NotMeasured,
     /// The arm sank after it was let go. Its motors drive it again.
     Sank,
-    /// The arm did not reach the pose, or had a fault while it was watched in the pose.
+    /// The motors are off, the arm has a fault or did not reach the pose, or a stop or a pause of the page ended the park.
     Move(PlayFailure),
 }
 

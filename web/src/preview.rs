@@ -20,9 +20,9 @@ const STEP_MICROS: f64 = 20_000.0;
 const STEPS_BETWEEN_STANDS: u32 = 5;
 /// The longest preview: five minutes of virtual time.
 const MOST_STEPS: u32 = 15_000;
-/// After two seconds a new arm drives its joints.
+/// The number of steps until a new arm drives its joints: 2 s.
 const STEPS_TO_START: u32 = 100;
-/// After three more seconds it has reached any pose.
+/// The number of further steps until a new arm has reached any pose: 3 s.
 const STEPS_TO_POSE: u32 = 150;
 /// A new arm has reached its pose if joints 1 to 6 are at most this far from it, in degrees: servos have play. Joint 7 may hold
 /// something.
@@ -134,7 +134,7 @@ fn pass(client: &mut Client, arm: &mut SimulatedSource, steps: u32) {
     (0..steps).for_each(|_| exchange(client, arm, STEP_MICROS));
 }
 
-/// Exchanges bytes between client and arm while this virtual time passes, in microseconds.
+/// Exchanges bytes between client and arm once, and lets `micros` microseconds of virtual time pass.
 pub(crate) fn exchange(client: &mut Client, arm: &mut SimulatedSource, micros: f64) {
     arm.send(&client.poll(arm.now()));
     arm.advance(micros, || true);

@@ -9,8 +9,8 @@
 //!                    ──▶ Player: a straight line
 //! ```
 //!
-//! The program continues after a block only when the arm has carried it out. A blocked or silent joint, a stop, or another
-//! program that moves the arm ends it.
+//! The program continues after a block only when the arm has carried out the block. A blocked or silent joint, a stop, or another
+//! client that moves the arm ends the program.
 
 mod command;
 mod failure;
@@ -180,7 +180,7 @@ impl ProgramRun {
         self.run_blocks(now, client)
     }
 
-    /// Fails if the arm has a problem or is silent, or another program has stopped it.
+    /// Fails if the arm has a problem or is silent, or another client has stopped the arm.
     fn watch(&mut self, now: Instant, client: &Client) -> Result<(), ProgramFailure> {
         if client.rounds() != self.watched_round {
             self.watched_round = client.rounds();

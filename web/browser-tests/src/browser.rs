@@ -11,7 +11,7 @@ use crate::connection::{Connection, line_after};
 const OPTIONS: &[&str] = &[
     "--headless=new",
     "--remote-debugging-port=0",
-    // Tests often run as root, who has no sandbox.
+    // Tests often run as root. Chromium does not run as root with its sandbox.
     "--no-sandbox",
     "--disable-dev-shm-usage",
     "--enable-automation",

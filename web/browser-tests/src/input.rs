@@ -72,7 +72,7 @@ impl Page {
     }
 
     fn mouse(&mut self, kind: &str, [x, y]: [f64; 2], pressed: u32) {
-        // A move with no button would end the pointer's capture by the page.
+        // A move during a drag has to name the button: without it, the page's capture of the pointer would end.
         let button = if kind == "mouseMoved" && pressed == 0 { "none" } else { "left" };
         let event =
             json!({ "type": kind, "x": x, "y": y, "button": button, "buttons": pressed, "clickCount": 1 });

@@ -180,7 +180,8 @@ impl Page {
         serde_json::from_str(text).unwrap_or_else(|error| panic!("{error}: {text}"))
     }
 
-    /// Waits until the state meets a condition. The page's time depends on the machine, so a test has no other clock.
+    /// Waits until the state meets a condition. The speed of the page depends on the machine, so a test waits for states, not for
+    /// times.
     #[track_caller]
     pub fn wait_for_state(&mut self, event: &str, holds: impl Fn(&Value) -> bool) -> Value {
         wait_for(event, || {
@@ -240,7 +241,7 @@ impl Page {
         });
     }
 
-    /// Lets this much time pass for the arm of the page, in seconds.
+    /// Waits until the clock of the page's arm has advanced by this time, in seconds.
     #[track_caller]
     pub fn pass(&mut self, seconds: f64) {
         let end = self.state()["time"].as_f64().expect("a time") + seconds * 1e6;

@@ -86,7 +86,7 @@ impl Viewed {
     }
 
     /// Begins a movement of joint 1 with this action, ends it by `sevenbot stop`, and waits until the page says so. On a busy
-    /// machine the page may pause for a second, or miss replies, which ends a movement, too: then it begins again.
+    /// machine the page may pause for a second, or miss replies, which ends a movement, too: then begins the movement again.
     ///
     /// # Panics
     /// The movement ends for another reason, or is late each time.

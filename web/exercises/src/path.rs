@@ -50,7 +50,7 @@ impl PathProgress {
         let is_near = |point: &Point| distance(*point, place) <= self.within;
         let ahead = self.checkpoints.iter().skip(self.passed).take_while(|point| is_near(point)).count();
         self.passed += ahead;
-        // A tip that cuts a corner stays near the last checkpoint that it passed.
+        // The tip may cut a corner as long as it is near the last checkpoint that it passed.
         let is_on_path = self.checkpoints.iter().take(self.passed).next_back().is_some_and(is_near);
         if !is_on_path {
             self.passed = 0;

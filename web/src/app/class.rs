@@ -291,8 +291,8 @@ impl App {
         }
     }
 
-    /// Ends the lease on this page, and returns to the simulated arm if the page drove the real one. `text` is the name of the
-    /// text that gives the reason; `None` shows no notice.
+    /// Hides the lease of the real arm, and returns to the simulated arm if the page drove the real one. `text` is the name of
+    /// the text that gives the reason; `None` shows no notice.
     fn end_real_arm(&mut self, text: Option<&'static str>) {
         self.dom.set_text("class-arm", "");
         self.dom.set_hidden("stop-class-arm", true);

@@ -58,7 +58,7 @@ impl Drop for ClassSocket {
         self.socket.set_onopen(None);
         self.socket.set_onmessage(None);
         self.socket.set_onclose(None);
-        // Without a code and a reason it cannot fail.
+        // Without a code and a reason, `close` cannot fail.
         let _ = self.socket.close();
     }
 }

@@ -94,7 +94,7 @@ impl App {
         only_watches
     }
 
-    /// Disables the controls while the server is read-only.
+    /// Disables the controls in [`DRIVING`] while the server is read-only, and enables them afterwards.
     pub(super) fn show_watching(&mut self) {
         let is_watching = self.only_watches();
         if !is_watching && !self.are_controls_off {

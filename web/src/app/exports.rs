@@ -6,7 +6,8 @@ use wasm_bindgen::prelude::wasm_bindgen;
 use super::page::with_app;
 use crate::arm_state::tip;
 
-/// The state of the page as JSON: angles and targets in degrees, the tip in mm, the time in microseconds.
+/// The state of the page as JSON: angles and targets in degrees, the tip in mm, the time in microseconds. The angle of a joint
+/// that was not measured is its target.
 #[wasm_bindgen]
 #[must_use]
 pub fn state() -> String {

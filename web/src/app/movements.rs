@@ -99,7 +99,7 @@ impl App {
     }
 
     /// Prepares the end of the line to the arm: ends the park, movement or program in progress, and makes moving joints hold.
-    /// Joints that another program moves continue. The page cannot confirm the hold any more, so it restores the speeds at once.
+    /// Joints that another client moves continue. The page cannot confirm the hold any more, so it restores the speeds at once.
     pub(super) fn leave_arm(&mut self) {
         let is_own = self.programs.run.is_some() || self.player.is_some() || self.park.is_some();
         let before = self.registers_before_movement();

@@ -114,7 +114,7 @@ fn show_nothing_known(dom: &Dom, language: Language) {
     dom.set_text("health", "");
 }
 
-/// The line with the supply voltage and the temperature, as far as they are known, and whether another program moves the arm.
+/// The line with the supply voltage and the temperature, as far as they are known, and whether another client moves the arm.
 fn health(app: &App, state: &ArmState) -> String {
     let language = app.language;
     let sharing = SharingState::of(app.client.registers());

@@ -17,7 +17,7 @@ use crate::words;
 
 /// The step of the slider, in seconds: the same as in index.html.
 const STEP: f64 = 0.05;
-/// The name of the notice while a preview runs.
+/// The name of the text of the notice while a preview runs.
 const PREVIEW_RUNS: &str = "preview-runs";
 
 impl App {

@@ -61,7 +61,7 @@ pub fn legend_height(width: f64) -> f64 {
     if is_narrow(width) { 2.0 * TEXT + 12.0 } else { TEXT + 12.0 }
 }
 
-/// Is there no room for the legend beside the title?
+/// Is the plot too narrow for the legend beside the title?
 fn is_narrow(width: f64) -> bool {
     width < LEFT + 7.0 * ENTRY + 130.0
 }

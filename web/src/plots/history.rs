@@ -79,7 +79,7 @@ impl History {
         self.samples.iter()
     }
 
-    /// The time of the last sample, in seconds.
+    /// The time of the last sample, in seconds; 0 for an empty history.
     #[must_use]
     pub fn end(&self) -> f64 {
         self.samples.back().map_or(0.0, |sample| sample.time)

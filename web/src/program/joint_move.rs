@@ -30,12 +30,12 @@ pub(super) struct JointMove {
     targets: FineTargets,
     /// The joints with a target, as [`Joint::bit`]s.
     joints: u8,
-    /// The time of the timeout.
+    /// The time at which the move has timed out, since the start of the clock.
     end: Duration,
     watch: MoveWatch,
     /// The round of the last registers that were checked.
     round: u64,
-    /// The arm had other targets in the last round. They may come from a stop by another program, which the server reports up to
+    /// The arm had other targets in the last round. They may come from a stop by another client, which the server reports up to
     /// one round later.
     has_other_targets: bool,
     /// The time since which no set-point moves; `None` while one moves.

@@ -117,7 +117,7 @@ fn d11_a_joint_on_its_way_holds_when_another_joint_is_moved() {
     assert_eq!(tab.registers(), before);
 }
 
-/// A joint that another program moves arrives at the target of that program, not at the one of this program.
+/// A joint that something else moves arrives at another target than the program has written.
 #[test]
 fn a_move_does_not_count_as_done_if_something_else_moves_its_joint() {
     let mut tab = Tab::new();

@@ -33,7 +33,7 @@ pub struct Ray {
 pub enum Preset {
     /// From the front right and above: the initial view.
     Corner,
-    /// From the front: the arm looks at the camera.
+    /// From the front: the arm points towards the camera.
     Front,
     /// From the right side.
     Side,
@@ -153,7 +153,8 @@ impl Camera {
         Ray { origin: self.position(), direction: direction.normalize() }
     }
 
-    /// Intersects the half line through a pixel with the plane through a point, parallel to the screen. All in mm.
+    /// Intersects the half line through a pixel (CSS pixels from the top left) with the plane that contains the point `through`
+    /// and is parallel to the screen. Points are in mm.
     #[must_use]
     pub fn on_facing_plane(&self, pixel: Vec2, through: Vec3) -> Vec3 {
         let (ray, back) = (self.ray(pixel), self.backward());

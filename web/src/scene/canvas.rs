@@ -180,7 +180,7 @@ fn context(canvas: &HtmlCanvasElement) -> Result<Option<Gl>, JsValue> {
 
 /// Chooses the number of rendered pixels per CSS pixel: 1 for software rendering.
 fn pixel_ratio(gl: &Gl) -> Result<f32, JsValue> {
-    // A browser may hide the name of the graphics processor. Then it counts as a graphics processor.
+    // A browser may hide the name of the graphics processor. Then assume a graphics processor.
     gl.get_extension("WEBGL_debug_renderer_info")?;
     let name = gl.get_parameter(UNMASKED_RENDERER)?.as_string().unwrap_or_default().to_ascii_lowercase();
     let is_software =

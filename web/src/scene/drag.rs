@@ -10,7 +10,7 @@ use sevenbot::cartesian::{Breach, Guard};
 use super::arm::{Angles, Hit, from_vector, point_of, tip_of, to_vector};
 use super::camera::Camera;
 
-/// One movement of the pointer searches this far to both sides of the last angle, in degrees.
+/// Each movement of the pointer searches the angles up to this far on both sides of the last angle, in degrees.
 const SEARCH: f32 = 24.0;
 /// The cost of a turn, in square pixels per square degree. It keeps the angle if a turn hardly moves the point on the screen.
 const COST_OF_TURNING: f32 = 0.02;
@@ -234,7 +234,7 @@ mod tests {
                 };
                 let hit = Hit { body, local, distance: 0.0 };
                 let mut drag = JointDrag::start(hit, POSE, &camera, drawn(POSE[place])).expect("a joint");
-                // The pointer follows the point through 12 degrees in steps of 1. The dragged point has to end at the pointer.
+                // Move the pointer to where the point is after a turn of 1 to 12 degrees. The dragged point has to end there.
                 let led = POSE[place] + 12.0;
                 for step in 1..=12 {
                     drag.to(drawn(POSE[place] + step as f32), POSE, &camera);

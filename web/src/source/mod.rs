@@ -15,7 +15,7 @@ pub enum LineState {
     Opening,
     /// The line is open.
     Open,
-    /// Opening failed, or the line was closed. Holds the reason in the browser's words; empty if the browser gives none.
+    /// Opening failed, or the line was closed. Holds the reason that the browser or the server gives; empty if there is none.
     Closed(String),
 }
 

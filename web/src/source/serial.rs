@@ -24,8 +24,8 @@ struct Port {
 }
 
 impl SerialSource {
-    /// Lets the user choose a port, and opens it. Call this only while the page handles a click: the browser allows the choice
-    /// only then. `None` if the browser has no Web Serial.
+    /// Lets the user choose a port, and opens the port. Call this only while the page handles an input of the user, such as a
+    /// click: the browser allows the choice only then. `None` if the browser has no Web Serial.
     #[must_use]
     pub fn ask() -> Option<Self> {
         let navigator = web_sys::window()?.navigator();

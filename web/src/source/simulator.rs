@@ -210,7 +210,8 @@ mod tests {
         assert!(held.targets[0] < 140.0 && held.moving == 0, "{held:?}");
     }
 
-    /// A joint that is not measured yet can hold only after it was measured. Until then it moves to its target.
+    /// During start-up (D12) a joint that is not measured yet has no position to hold. The stop has to wait for it, because the
+    /// joint would later move to the target that was written before the stop.
     #[test]
     fn a_stop_during_start_up_waits_for_every_joint() {
         let (mut client, mut arm) = (Client::default(), SimulatedSource::default());

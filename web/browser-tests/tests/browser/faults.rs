@@ -14,12 +14,12 @@ fn scene(page: &mut Page) -> Picture {
     page.picture_of([30.0, 118.0], [780.0, 420.0])
 }
 
-/// Pixels in the colour of joints that work, in any light.
+/// The number of pixels in the colour of joints that work, in any light.
 fn working(picture: &Picture) -> usize {
     picture.count(|[red, green, blue]| green > red.saturating_add(25) && blue > red.saturating_add(25))
 }
 
-/// Pixels in the colour of a joint with a fault, in any light.
+/// The number of pixels in the colour of a joint with a fault, in any light.
 fn faulty(picture: &Picture) -> usize {
     picture.count(|[red, green, blue]| red > green.saturating_add(70) && red > blue.saturating_add(90))
 }

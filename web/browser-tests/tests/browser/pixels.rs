@@ -42,7 +42,7 @@ fn the_tip_is_drawn_within_2_pixels_of_the_kinematics() {
             [below(181), 60 + below(60), 50 + below(50), below(181), 45 + below(90), below(181), below(84)];
         run_at(&mut page, 1_000);
         page.slide_all(degrees);
-        // The longest move takes two seconds at the usual speed.
+        // The longest move takes less than two seconds at the usual speed, 114 degrees/s.
         page.pass(3.0);
         // Pause the simulation, so that the page has time to draw.
         run_at(&mut page, 0);
