@@ -363,8 +363,8 @@ const TEXTS: &[(&str, &str, &str)] = &[
     ("not-taken", "The arm does not take its commands.", "机械臂不接受命令。"),
     (
         "not-reached",
-        "The arm is not at its last pose. Look for what holds these joints:",
-        "机械臂未到达最后的姿态，请检查以下关节是否被卡住：",
+        "These joints have not reached their targets. Look for what holds them:",
+        "以下关节未到达目标位置，请检查是否有东西卡住它们：",
     ),
     ("programs", "Programs", "程序"),
     (
