@@ -50,8 +50,8 @@ impl LineTime {
         self.allowance
     }
 
-    /// Notes that a reply came at `now`, and was due at `due`. A longer delay counts at once, and is forgotten over some ten
-    /// replies.
+    /// Notes that a reply came at `now`, and was due at `due`. A longer delay lengthens the allowance at once. Each later reply
+    /// shortens it by 1/8.
     pub(crate) fn note_reply(&mut self, due: Instant, now: Instant) {
         let forgotten = self.allowance.as_micros() / FORGETTING;
         let allowance = self.allowance.as_micros().saturating_sub(forgotten);

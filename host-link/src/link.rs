@@ -82,14 +82,14 @@ impl HostLink {
         self.last_id
     }
 
-    /// Writes registers, at most 255, by the function of a map ([M1](protocol_core::decisions#m1)). A write has no reply
+    /// Writes registers, at most 255, with the function code of a map ([M1](protocol_core::decisions#m1)). A write has no reply
     /// ([D6](protocol_core::decisions#d6)). It is sent after the requests in the queue. Reads that were sent before the write
     /// are not repeated after it.
     pub fn write(&mut self, map: Map, address: u8, values: &[u8]) {
         self.queue.push_back(Queued::Write(encoded_write(map, address, values)));
     }
 
-    /// As [`Self::write`], before everything that waits to be sent: for a stop. Several of these keep their order.
+    /// As [`Self::write`], but sent before all other requests in the queue: for a stop. Several such writes keep their order.
     pub fn write_ahead(&mut self, map: Map, address: u8, values: &[u8]) {
         let place = self.queue.iter().take_while(|queued| matches!(queued, Queued::WriteAhead(_))).count();
         self.queue.insert(place, Queued::WriteAhead(encoded_write(map, address, values)));

@@ -84,7 +84,8 @@ impl PendingReads {
         Some(Matched { id, due, lost })
     }
 
-    /// A damaged frame came at `now`: the reply to the oldest read that is due by then, which is returned.
+    /// A damaged frame came at `now`. It counts as the reply to the oldest awaited read, if that reply is due by then. Returns
+    /// this read; `None` if no reply is due.
     pub(crate) fn note_damage(&mut self, now: Instant) -> Option<RequestId> {
         let read = self.0.iter_mut().find(|read| read.id.is_some() && !read.is_damaged)?;
         read.is_damaged = read.due <= now;

@@ -56,13 +56,14 @@ pub enum Command {
 }
 
 impl Command {
-    /// The register and the value that a program writes.
+    /// The register, and the value that a program writes there to give this command.
     #[must_use]
     pub const fn write(self) -> (u8, [u8; 1]) {
         (COMMAND, [self as u8])
     }
 
-    /// The command in a write of registers from `address` on.
+    /// The command in a write of registers from `address` on; `None` if the write does not cover register 239, or the value
+    /// there is no command.
     #[must_use]
     pub fn in_write(address: u8, values: &[u8]) -> Option<Self> {
         let value = *values.get(usize::from(COMMAND.checked_sub(address)?))?;

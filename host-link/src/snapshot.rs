@@ -5,7 +5,7 @@ use protocol_core::registers::{Joint, Register};
 
 use crate::span::Span;
 
-/// The only known layout version of the three blocks.
+/// The only known layout version of the extended block, the protection block and the status block.
 const KNOWN_LAYOUT: u8 = 1;
 
 /// The values of consecutive registers at one instant.

@@ -137,7 +137,8 @@ mod tests {
         Vector::new(x, y, z)
     }
 
-    /// Rear arm upright, forearm level, hand straight on: quarter turns are exact, so every number is.
+    /// The rear arm is upright, the forearm level, and the hand in line with it. Quarter turns are exact, so all coordinates
+    /// are.
     #[test]
     fn the_frames_of_the_straight_pose() {
         let Frames { arm, hand } = forward([90.0, 90.0, 65.0, 90.0, 90.0, 90.0]);
@@ -162,7 +163,7 @@ mod tests {
         );
     }
 
-    /// Half a degree more of each joint moves the points behind that joint, in the right direction.
+    /// Half a degree more of a joint moves the part beyond that joint in the expected direction, and by the expected distance.
     #[test]
     fn each_joint_moves_its_part() {
         let small = 0.5_f64.to_radians();

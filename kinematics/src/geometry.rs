@@ -46,7 +46,7 @@ pub const BASE_RADIUS: f64 = 78.0;
 pub const FINGER_AXIS: [f64; 2] = [14.0, 11.0];
 /// The bend of a finger: along the tool and outward from its axis, with the claw closed; an estimate.
 pub const FINGER_BEND: [f64; 2] = [22.0, 6.0];
-/// The end of a finger, measured as the bend; an estimate.
+/// The end of a finger, in the coordinates of [`FINGER_BEND`]; an estimate.
 pub const FINGER_END: [f64; 2] = [52.0, -7.0];
 
 /// From the elbow axis to the wrist: the hypotenuse of [`FOREARM`] and [`ELBOW_OFFSET`].

@@ -6,9 +6,9 @@
 //!   IK7:  disc in the hand's frame ───────────────▶ T6
 //! ```
 //!
-//! A wrist has two headings: towards it, and away from it with the wrist behind the base axis. Joint 1 reaches one of
-//! them, or both where y is 0. The parallelogram allows one of the two bends of the elbow, and joint 4 one of the two
-//! rolls of the hand. So there is one solution, except in the cases that [`ik5`] and [`ik6`] name.
+//! Two headings bring the wrist to a point: towards the point, and away from it, with the wrist behind the base axis. Joint 1
+//! reaches one of these headings, or both where y is 0. The parallelogram allows one of the two bends of the elbow, and joint 4
+//! one of the two rolls of the hand. So there is one solution, except in the cases that [`ik5`] and [`ik6`] name.
 
 use crate::float::Float;
 use crate::forward::{ArmFrames, HandFrames};
@@ -49,8 +49,8 @@ pub enum NoSolution {
 ///
 /// # Errors
 ///
-/// Why the arm does not reach the point when it heads towards the point. The first reason counts: a number that is not
-/// finite, no heading, the distance, joint 2, joint 3, joint 1.
+/// Why the arm cannot reach the point with the heading towards it. The first reason in this order is returned: a number that is
+/// not finite, no heading, the distance, joint 2, joint 3, joint 1.
 pub fn ik5<F: Float>(wrist: Vector<F>) -> Result<[F; 3], NoSolution> {
     with_either_heading(wrist, Ok)
 }
@@ -172,7 +172,8 @@ pub(crate) fn roll_and_bend<F: Float>(arm: &ArmFrames<F>, tool: Vector<F>) -> Re
     joint_angle(t5).map(|t5| [t4, t5]).ok_or(NoSolution::ToolDirection)
 }
 
-/// The vector scaled to length 1. Fails with `none` if the vector is zero.
+/// The vector scaled to length 1. Fails with `none` if the vector is zero, and with [`NoSolution::NotFinite`] if a component is
+/// infinite or NaN.
 pub(crate) fn direction<F: Float>(vector: Vector<F>, none: NoSolution) -> Result<Vector<F>, NoSolution> {
     if vector.is_finite() { vector.unit().ok_or(none) } else { Err(NoSolution::NotFinite) }
 }

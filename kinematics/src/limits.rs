@@ -75,7 +75,7 @@ mod tests {
             {
                 let mut angles = [90.0, 90.0, 65.0, 90.0, 90.0, 90.0];
                 angles[usize::from(joint) - 1] = angle;
-                // The linkage is fine with joint 2 or 3 at either end if the other is in the middle.
+                // With the other joint at this angle, joint 2 or 3 at an end does not break the linkage.
                 let other = if angle > 90.0 { 20.0 } else { 100.0 };
                 match joint {
                     2 => angles[2] = other,

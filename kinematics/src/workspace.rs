@@ -18,8 +18,8 @@ use crate::forward::{ArmFrames, Frames, HandFrames};
 use crate::geometry::{BASE_HEIGHT, BASE_RADIUS, DISC_RADIUS};
 use crate::vector::Vector;
 
-/// The distance that the arm keeps from its base, in mm. It is less than half the width of the hand, 13.5 mm, because the
-/// parts of the hand are round.
+/// The distance that the arm keeps from its base, in mm. The hand is checked as a line, and half of its width is 13.5 mm. A
+/// smaller margin is enough, because the parts of the hand are round.
 pub const BASE_MARGIN: f64 = 10.0;
 /// The radius of the cylinder that is kept free, in mm.
 pub const KEEP_OUT_RADIUS: f64 = BASE_RADIUS + BASE_MARGIN;
@@ -83,7 +83,7 @@ pub struct Clearance {
 /// The space that the arm must not enter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Workspace {
-    /// The height of the table in mm: z, as of all positions.
+    /// The height of the table: its z coordinate in mm.
     pub table: f64,
 }
 
@@ -107,7 +107,7 @@ impl Workspace {
     }
 
     fn above_table(&self, Frames { arm, hand }: &Frames<f64>) -> Clearance {
-        // The lowest point of the edge: all of the radius where the disc stands upright, nothing where it is level.
+        // The edge of the disc reaches below the tip: by the radius if the disc is upright, and by nothing if it is level.
         let level = (1.0 - hand.tool.z * hand.tool.z).max(0.0);
         let edge = hand.tip.z - DISC_RADIUS * Float::sqrt(level);
         let parts = [
@@ -155,7 +155,8 @@ fn segment_from_base(from: Vector<f64>, to: Vector<f64>) -> f64 {
     let at = |share: f64| distance_from_base(from + (to - from) * share);
     let ends = at(0.0).min(at(1.0));
     if from.z.min(to.z) > KEEP_OUT_TOP {
-        // No point of the line is lower than its ends.
+        // No point of the line is lower than its ends, so all are above the cylinder. The smallest distance may be less than
+        // this.
         return ends;
     }
     let (mut low, mut high) = (0.0, 1.0);

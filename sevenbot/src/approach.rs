@@ -20,7 +20,7 @@ use crate::recording::{Moment, Recording};
 use crate::units::Speed;
 use host_link::Snapshot;
 
-/// A first point is refused if a joint is further from it, in degrees.
+/// With [`ApproachRule::Near`], a first point is refused if a joint is further from it than this, in degrees.
 pub const NEAR_DEGREES: f64 = 5.0;
 /// The largest speed of a joint with [`ApproachRule::Near`] and [`ApproachRule::Slowly`], in degrees/s.
 const SLOW_DEGREES_PER_SECOND: f64 = 30.0;
@@ -158,7 +158,7 @@ impl Approach {
             return self.to;
         }
         let share = time.as_secs_f64() / self.duration.as_secs_f64();
-        // 0 at 0 and 1 at 1, with velocity 0 at both.
+        // Goes from 0 to 1, with velocity 0 at both ends.
         let blend = share * share * (3.0 - 2.0 * share);
         let mut point = self.to;
         for (angle, from) in point.iter_mut().zip(self.from) {

@@ -63,9 +63,9 @@ impl Arm {
         }))
     }
 
-    /// Sets targets and reads them back. The joints approach them by speed or time, as they approach whole degrees: for
-    /// these frames, the set-point period that another program left is switched off
-    /// ([D23](protocol_core::decisions#d23)). Only for an arm with the extended block.
+    /// Sets targets and reads them back. The joints approach them by speed or time, as they approach whole degrees
+    /// ([D23](protocol_core::decisions#d23)): the set-point period of another program is switched off for these frames, and
+    /// restored afterwards. Only for an arm with the extended block.
     ///
     /// # Errors
     /// As [`Arm::write_checked`].

@@ -26,7 +26,7 @@ use host_link::{Snapshot, Span};
 
 /// The value of a time register in the maker's firmware until a time is written: the low byte of 1000 ms.
 const STOCK_TIME_AT_START: u8 = 232;
-/// 1000 ms as a value of the register.
+/// 1000 ms as a value of a time register, whose unit is 100 ms.
 const ONE_SECOND: u8 = 10;
 /// Map 2.1 stores an offset as 128 + offset. 0 and 255 mean that no offset is stored.
 const OFFSET_ZERO: u8 = 128;
@@ -36,12 +36,12 @@ const NO_OFFSET: u8 = 64;
 /// The extended block and the protection block.
 const OUR_BLOCKS: RangeInclusive<u8> = FINE_TARGET.address..=PROTECTION_VERSION.address;
 
-/// How an arm sees the registers of map 2.2.
+/// Translates between the registers of map 2.2 and the map of an arm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct MapView {
     /// The map of the arm's frames.
     pub(crate) map: Map,
-    /// Ours serves both maps.
+    /// The firmware of the arm. Ours serves both maps.
     pub(crate) firmware: Firmware,
 }
 

@@ -54,8 +54,8 @@ impl OpenPort {
 }
 
 impl OpenPort {
-    /// The number of bytes that a read asks for. On Windows, only those that have arrived, or one: a read may wait until all
-    /// bytes have arrived, because Wine and some drivers lack the timeouts with which it returns after the first ones.
+    /// The number of bytes that a read asks for. On Windows, only as many as have arrived, and at least one. Wine and some
+    /// drivers lack the timeout that ends a read after its first bytes, so a read there waits for all bytes that it asks for.
     fn readable_length(&self, longest: usize) -> serialport::Result<usize> {
         if !cfg!(windows) {
             return Ok(longest);

@@ -130,7 +130,7 @@ fn segments(recording: &Recording, factor: f64) -> Vec<WholeMoment> {
     points
 }
 
-/// Evenly spaced moments between two, at most a segment apart.
+/// Evenly spaced moments between two moments, at most [`MAX_SEGMENT`] apart; none if the two poses are equal.
 fn interpolated(from: WholeMoment, to: WholeMoment) -> impl Iterator<Item = WholeMoment> {
     let span = to.time - from.time;
     let count = span.as_millis().div_ceil(MAX_SEGMENT.as_millis());
@@ -197,7 +197,7 @@ impl Waypoints<'_> {
         Some(speed_for(degrees, until.saturating_sub(self.time(index))))
     }
 
-    /// When a joint that moves now moves again, or the time of the last point.
+    /// When a joint that moves from this point to the next one moves again; the time of the last point if it does not.
     fn next_move(&self, index: usize, joint: usize) -> Duration {
         let mut later = index + 1..self.points.len();
         let next = later.find(|&later| self.degrees(later, joint) > 0.0);

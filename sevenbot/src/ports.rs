@@ -14,9 +14,10 @@ use crate::identity::Identity;
 use crate::network::{Address, LocalServer, servers};
 use host_link::Span;
 
-/// Eight registers take 2 ms at 115,200 baud and 25 ms at 9,600 baud. USB adapters add up to 16 ms in each direction.
+/// The timeout of one attempt. A read of eight registers takes 2 ms at 115,200 baud and 23 ms at 9,600 baud. USB adapters add
+/// up to 16 ms in each direction.
 const PROBE_TIMEOUT: Duration = Duration::from_millis(200);
-/// A port that was just opened may first deliver garbage.
+/// More than one attempt, because a port may first deliver garbage after it was opened.
 const PROBE_ATTEMPTS: u32 = 2;
 
 /// A serial port of this machine.

@@ -45,8 +45,9 @@ impl Arm {
 const FRAMES_BETWEEN_READINGS: u32 = 4_096;
 
 /// Has the controller restarted between two readings of its counter of frames? A restart sets the counter to 0. So the second
-/// reading is behind the first, which looks like a long way forward, because the counter wraps. `frames` is the number of frames
-/// that the arm can have accepted since the first reading, besides 4,096.
+/// reading is smaller than the first. Because the counter wraps, this looks like a large increase. An increase of more than
+/// 4,096 + `frames` counts as a restart: `frames` is the number of further frames that the arm can have accepted since the
+/// first reading.
 ///
 /// A restart remains undetected
 /// - if the first reading was less than 4,096 + `frames` before the counter wraps,

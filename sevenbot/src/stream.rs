@@ -7,7 +7,8 @@
 //!   LatestPoints: what a program that does not wait sends then ────────┘
 //! ```
 //!
-//! If the program dies, the watchdog makes the arm hold. A clean end, an error and a panic put the registers back.
+//! If the program dies, the watchdog of the arm acts: [`WatchdogAction`]. A clean end, an error and a panic put the registers
+//! back.
 
 use std::time::Duration;
 
@@ -34,7 +35,7 @@ pub use pace::{PaceCounts, StreamPace};
 
 /// The registers that a stream sets: period, time of the watchdog, action of the watchdog.
 const STREAM_REGISTERS: Span = Span::between(&SET_POINT_PERIOD, &WATCHDOG_ACTION);
-/// No stream, no watchdog.
+/// The values of these registers without a stream: no set-point period, no watchdog.
 const SWITCHED_OFF: [u8; 4] = [0; 4];
 /// The unit of the watchdog's time.
 const WATCHDOG_STEP: Duration = Duration::from_millis(10);
@@ -348,7 +349,8 @@ fn is_left_behind(arm: &mut Arm) -> Result<bool, Error> {
     Ok(arm.status()?.is_some_and(|status| status.faults() & fault::HOST_SILENT != 0))
 }
 
-/// The registers to put back. If the watchdog acted, the program that set them is gone, and they are switched off.
+/// The values to put back at the end. If the watchdog has acted, the program that set the registers is gone: then the values
+/// are [`SWITCHED_OFF`].
 fn registers_before(arm: &mut Arm) -> Result<Vec<u8>, Error> {
     if is_left_behind(arm)? {
         return Ok(SWITCHED_OFF.to_vec());

@@ -1,4 +1,4 @@
-//! Parses both directions of the host link at once, as on a line that only listens.
+//! Parses the bytes of both directions of the host link, which a listener on the line receives as one stream.
 //!
 //! ```text
 //!   .. 01 02 AA 77 03 36 07 81 CE AA 77 03 36 07 5A 5A .. 43 81 ..

@@ -107,7 +107,7 @@ impl Speed {
 pub struct MoveTime(u8);
 
 impl MoveTime {
-    /// No duration: the motor moves at its maximum.
+    /// No duration: a joint with [`Speed::MAXIMUM`] moves as fast as its motor can.
     pub const NONE: Self = Self(0);
 
     /// `steps` of 100 ms, 0 to 100. `None` above 100.

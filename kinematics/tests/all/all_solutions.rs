@@ -3,7 +3,7 @@
 use kinematics::limits::check_arm;
 use kinematics::{NoSolution, Vector, forward, ik5, ik5_all, ik6, ik6_all};
 
-/// The solutions for a tip, after a check that each brings it there and obeys the limits.
+/// The solutions for a tip. Checks that each of them brings the tip there and obeys the limits.
 fn solutions(tip: Vector<f64>, tool: Vector<f64>) -> Vec<[f64; 5]> {
     let all = ik6_all(tip, tool).expect("within reach");
     assert_eq!(all[0], ik6(tip, tool).ok(), "the first is that of ik6");

@@ -1,6 +1,7 @@
 //! Golden poses, computed with the maker's published kinematics in double precision.
 //!
-//! Solutions are compared at 0.001 degrees, positions at 0.01 mm: the tables are rounded to that.
+//! The tables hold angles to 0.001 degrees and positions to 0.01 mm. Angles may differ from them by 0.001 degrees, and
+//! positions by 0.005 mm, half of the last digit.
 
 use kinematics::{Float, NoSolution, Vector, forward, ik5, ik6, ik7};
 

@@ -1,4 +1,4 @@
-//! Any pose the arm can take is found again from its positions.
+//! A million random legal poses are each found again from their positions, in `f32` and in `f64`.
 
 use crate::common::legal_poses;
 use kinematics::limits::check_arm;
@@ -24,7 +24,7 @@ fn distances(was: &Frames<f64>, is: &Frames<f64>) -> [f64; 3] {
     [distance(was.arm.wrist, is.arm.wrist), distance(was.hand.tip, is.hand.tip), edge.min(opposite)]
 }
 
-/// Angles in `F` to positions in `F`, back to angles in `F`. The differences are measured in `f64`.
+/// Converts angles to positions and back to angles, all in `F`. Returns the distances between the poses, computed in `f64`.
 fn round_trip<F: Float + Into<f64>>(pose: [f64; 6]) -> [f64; 3] {
     let pose = pose.map(F::of);
     let Frames { arm, hand } = forward(pose);

@@ -1,7 +1,7 @@
 //! An independent solver agrees: `rs-opw-kinematics`, for arms with six joints and a spherical wrist.
 //!
-//! Its model has the dimensions of this arm, but each joint turns what follows it: there is no parallelogram. So its
-//! third angle is the linkage, and its zero is the upright arm. It knows no limits of this arm.
+//! Its model has the dimensions of this arm, but no parallelogram: each joint turns all parts beyond it. So the model's third
+//! angle is the linkage, and all its angles are 0 for the upright arm. The solver does not check the limits of this arm.
 //!
 //! ```text
 //!   q1 = T1   q2 = 90 - T2   q3 = linkage(T2, T3)   q4 = 90 - T4   q5 = T5 - 90   q6 = -T6
@@ -21,7 +21,7 @@ use rs_opw_kinematics::kinematics_impl::OPWKinematics;
 use rs_opw_kinematics::parameters::opw_kinematics::Parameters;
 
 const POSES: usize = 20_000;
-/// Degrees from a limit at which the two may disagree.
+/// Within this distance from a limit, in degrees, the two solvers may disagree.
 const MARGIN: f64 = 0.001;
 
 fn witness() -> OPWKinematics {
@@ -53,7 +53,7 @@ fn from_witness(angles: [f64; 6]) -> [f64; 6] {
     [wrapped(q1), t2, t3, wrapped(90.0 - q4), wrapped(q5 + 90.0), (-q6).rem_euclid(180.0)]
 }
 
-/// Does a solution keep all limits, with this much to spare?
+/// Does a solution keep all limits, each with this margin in degrees?
 fn is_legal([t1, t2, t3, t4, t5, _]: [f64; 6], to_spare: f64) -> bool {
     let is_within = |angle: f64, least: f64, most: f64| angle >= least + to_spare && angle <= most - to_spare;
     [t1, t2, t3, t4, t5].iter().all(|&angle| is_within(angle, 0.0, 180.0))
@@ -64,7 +64,7 @@ fn glam(vector: Vector<f64>) -> DVec3 {
     DVec3::new(vector.x, vector.y, vector.z)
 }
 
-/// The pose of the tip: the disc is opposite to the x axis, the tool along z.
+/// The pose of the tip in the axes of the witness: x is opposite to the direction of the disc, z is along the tool.
 fn pose(angles: [f64; 6]) -> Pose {
     let hand = forward(angles).hand;
     let (x, z) = (-glam(hand.disc), glam(hand.tool));
@@ -95,7 +95,7 @@ fn a_pose_is_solved_exactly_if_the_witness_has_a_legal_solution() {
     let mut random = Rng::with_seed(4);
     let (mut solved, mut refused) = (0, 0);
     for _ in 0..4 * POSES {
-        // Joints 1 to 3 within half a turn and a bit, so that enough poses are legal.
+        // Joints 1 to 3 have a range of only 200 degrees, so that enough poses are legal.
         let angles = std::array::from_fn(|joint| {
             random.f64() * [200.0, 200.0, 200.0, 360.0, 360.0, 360.0][joint] - 10.0
         });
@@ -118,7 +118,7 @@ fn a_pose_is_solved_exactly_if_the_witness_has_a_legal_solution() {
     assert!(solved > POSES / 2 && refused > POSES / 2);
 }
 
-/// Solutions of the witness that keep all limits, for legal poses.
+/// For each legal pose, the witness has at most one solution that keeps all limits.
 #[test]
 fn a_legal_pose_has_no_second_solution() {
     let witness = witness();

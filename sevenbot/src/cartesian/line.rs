@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!   start, end, speed ──▶ TipPath: tip and tool at any fraction of the line
-//!       10 or more times a period, each 0.5 mm ──▶ angles of the same branch ──▶ reach, jumps and speeds checked
+//!       10 or more checks a period, at most 0.5 mm apart ──▶ angles of the same branch ──▶ reach, jumps and speeds checked
 //!       each period ──▶ whole degrees, or hundredths ──▶ Moment, and its distance from the line
 //! ```
 

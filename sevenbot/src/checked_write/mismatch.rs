@@ -20,7 +20,7 @@ use crate::names::name_of_register;
 pub struct WriteMismatch {
     /// The register.
     pub address: u8,
-    /// The raw value that was written: one byte, or two with the low byte first.
+    /// The raw value that was written. For a two-byte register, both bytes as one number.
     pub wanted: u16,
     /// The raw value that was read back.
     pub found: u16,

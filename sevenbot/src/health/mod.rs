@@ -148,7 +148,8 @@ impl Health {
         let explained = problems.iter().any(|problem| problem.kind != ProblemKind::Blocked);
         let faults = self.faults.unwrap_or(0);
         let faults = FAULT_BITS.into_iter().filter(|(bit, _)| faults & bit != 0);
-        // Silent servos and alarms also set the bit of the servo bus, and are problems of their own that say more.
+        // Silent servos and alarms also set the bit of the servo bus. They are reported as problems of their own, which say
+        // more.
         let told = faults.filter(|(bit, _)| *bit != fault::SERVO_BUS || !explained);
         problems.extend(told.map(|(_, kind)| Problem::of_arm(kind)));
         problems.sort_unstable();

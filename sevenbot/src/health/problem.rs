@@ -48,7 +48,7 @@ pub enum ProblemKind {
 /// The texts of one kind of problem.
 struct ProblemTexts {
     kind: ProblemKind,
-    /// For a table: a word or two.
+    /// For a table: a few words.
     name: &'static str,
     /// A sentence without its full stop. For a joint's problem, the part after "joint 2 ".
     words: &'static str,
@@ -203,7 +203,7 @@ impl ProblemKind {
         Self::ReceiveOverrun,
     ];
 
-    /// A word or two, for a table.
+    /// A few words, for a table.
     #[must_use]
     pub fn name(self) -> &'static str {
         self.texts().map_or("", |texts| texts.name)

@@ -30,7 +30,7 @@ const POLL_PERIOD: Duration = Duration::from_millis(100);
 const ALARM_GRACE: Duration = Duration::from_secs(3);
 /// Questions and answers take at most 1/10 of the line's capacity.
 const SHARE_OF_LINE: u32 = 10;
-/// Bits of a question and its answer on the line: 7 bytes each around the values, ten bits a byte.
+/// Bits of a question and its answer on the line: 7 bytes each, and the values of the answer. A byte has ten bits.
 const BITS_PER_CHECK: u32 = 10 * (7 + 7 + REGISTERS.count() as u32);
 /// Bits of the shortest frame on the line: seven bytes of ten bits.
 const BITS_OF_FRAME: u128 = 70;

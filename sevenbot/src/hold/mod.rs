@@ -34,7 +34,7 @@ const REPEAT_PERIOD: Duration = Duration::from_millis(100);
 /// The slowest speed, 1.9 degrees/s. It acts on moves that go on (D11), and bounds streams (D23).
 const BRAKE: [u8; 7] = [1; 7];
 
-/// Why the arm may not hold: it may still be moving.
+/// Why it is uncertain whether the arm holds. The arm may still be moving.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the arm may not hold: {0}")]
 pub struct HoldError(#[from] pub WriteError);

@@ -76,7 +76,7 @@ fn stop(
     arm: &mut PlainArm,
     mut comes: impl FnMut(Duration) -> bool,
 ) -> (HoldStep, Duration) {
-    // As the page does: a round of reads is sent after the last one was answered or lost.
+    // As the page does: a round of reads is sent after the previous round was answered or lost.
     let (mut now, mut asked) = (ms(0), ms(0));
     loop {
         match hold.poll(now) {

@@ -129,8 +129,8 @@ impl JointMove {
         let before = PaceBefore::read(arm, &targets)?;
         let begun = pace.set(arm, &targets).and_then(|()| Self::begin_fine(arm, targets));
         if begun.is_err() {
-            // A second failure has the same reason, so it is ignored. The arm may have taken the targets: `put_back` leaves the
-            // pace of joints that move.
+            // A second failure has the same reason, so it is ignored. The arm may have taken the targets: `put_back` writes
+            // nothing while a joint moves.
             let _ = before.put_back(arm);
         }
         begun

@@ -65,8 +65,8 @@ impl PaceBefore {
         Ok(Self { registers, joints: joints_of(targets) })
     }
 
-    /// The paces that a move without one would have, other than the default speed, each with its joints as
-    /// [`Joint::bit`](crate::Joint::bit)s.
+    /// The paces of the joints whose speed is not the default. A move that sets no pace has these. Each pace comes with its
+    /// joints, as [`Joint::bit`](crate::Joint::bit)s.
     #[must_use]
     pub fn other_than_default(&self) -> Vec<(u8, Pace)> {
         let (speeds, times) = (self.registers.joints(&SPEED), self.registers.joints(&TIME));

@@ -28,7 +28,8 @@ use host_link::Span;
 /// Found on the simulated arm without payload: no joint carries more than its friction holds (`docs/design.md`).
 pub const PARK_POSE: [Option<u8>; 7] = [None, Some(90), Some(0), Some(90), Some(48), None, None];
 
-/// The forearm beyond this angle comes down before the rear arm goes up: the linkage ends at 161 degrees.
+/// A forearm at a greater angle first moves to this angle. Then the linkage stays below its limit of 161 degrees when the rear
+/// arm becomes upright.
 const FOREARM_LIMIT_DEGREES: u8 = 120;
 /// The speed of the way to the pose: 19 degrees/s.
 const SPEED_STEPS: u8 = 10;

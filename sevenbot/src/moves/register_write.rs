@@ -1,4 +1,4 @@
-//! Writes of any registers. A write that moves the arm is refused and checked as a move is.
+//! Writes of any registers. A write that moves the arm gets the checks of a move, before and after it.
 
 use protocol_core::registers::Joint;
 use protocol_core::registers::map::{FINE_TARGET, MOTOR_STATE, TARGET_POSITION, motor_state};

@@ -109,7 +109,7 @@ fn a_park_that_fails_lets_no_joint_race() {
     assert_eq!(arm.read(SPEED.address, 7), Ok(vec![0; 7]));
 }
 
-/// Acts once, when the motors are off.
+/// Carries out an action once, as soon as the motors are off.
 struct WhenLetGo(SharedSimulation, Option<&'static str>);
 
 impl Observer for WhenLetGo {

@@ -1,4 +1,4 @@
-//! The address of an arm behind a server, as it stands in the place of a port's name.
+//! The address of an arm behind a server, which a user gives instead of a port's name.
 
 use std::path::PathBuf;
 use std::{env, fmt};

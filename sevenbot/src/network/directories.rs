@@ -3,13 +3,13 @@
 use std::env;
 use std::path::{Path, PathBuf};
 
-/// The directory of the servers' files: `7bot` in `XDG_RUNTIME_DIR`, otherwise in the state directory. `None` if others can
-/// write there.
+/// The directory of the servers' files: `7bot` in `XDG_RUNTIME_DIR`, otherwise in the state directory. `None` if it cannot be
+/// created, if others can write there, or if the system is not Unix.
 pub(super) fn runtime_directory() -> Option<PathBuf> {
     private(absolute("XDG_RUNTIME_DIR").or_else(state_base)?)
 }
 
-/// The directory for files that outlive the session: `7bot` in the state directory. `None` if others can write there.
+/// The directory for files that outlive the session: `7bot` in the state directory. `None` as for [`runtime_directory`].
 pub(super) fn state_directory() -> Option<PathBuf> {
     private(state_base()?)
 }

@@ -53,7 +53,7 @@ impl LocalServer {
         if let Some(name) = &self.name {
             text.push_str(&format!("name {name}\n"));
         }
-        // Removes a link that another user planted, so that it is not followed.
+        // `create_new` fails if the file exists. A killed program with the same process id may have left it.
         let _ = fs::remove_file(&path);
         let mut file = fs::File::create_new(&path)?;
         io::Write::write_all(&mut file, text.as_bytes())?;

@@ -82,7 +82,7 @@ impl SocketLine {
 fn connect_named(name: &str, token: Option<&str>) -> Result<Box<dyn Stream>, OpenError> {
     if let Some(known) = announced(name) {
         let stream = connect_known(&known, token)?;
-        // The remembered address is for networks that block multicast. Announced names work without it.
+        // Ignore a failure: a name that is announced works without a remembered address.
         let _ = remember(&known);
         return Ok(stream);
     }

@@ -45,7 +45,7 @@ pub struct ServoReply {
     pub values: Vec<u8>,
 }
 
-/// The only master of a servo bus.
+/// The master of a servo bus. A bus must have only one.
 pub struct BusMaster {
     line: Box<dyn ServoLine>,
     start: Instant,

@@ -17,7 +17,7 @@ pub const MIDDLE: u16 = 511;
 const ARRIVED_COUNTS: u16 = 4;
 /// The torque switch: code 1 is on in both of Feetech's tables.
 const TORQUE_ON: [u8; 1] = [1];
-/// Damping in the older table, free in the current one. Neither gives torque.
+/// Code 0 is damping in Feetech's older table, and free in the current one. In both the motor does not drive.
 const TORQUE_OFF: [u8; 1] = [0];
 /// Registers from the present position to the moving flag.
 const MEASURED: u8 = register::MOVING - register::PRESENT_POSITION + 1;

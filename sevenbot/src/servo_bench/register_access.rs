@@ -29,7 +29,7 @@ pub enum SetError {
         /// The value.
         value: i32,
     },
-    /// An id is set by another function, which looks for a second servo with that id. Nothing was sent.
+    /// An id is set by [`set_id`](super::set_id::set_id), which first checks that only one servo answers. Nothing was sent.
     #[error("an id is set by `set-id`, which checks that no other servo has it")]
     IdNeedsCheck,
     /// The EEPROM cannot be opened. The register was not written.
@@ -72,7 +72,8 @@ pub fn get_all(bus: &mut BusMaster, id: u8) -> Result<Vec<ServoValue>, ServoErro
 /// A new baud rate of the servo becomes the rate of the bus, too.
 ///
 /// # Errors
-/// See [`SetError`]: each variant says whether the value was written.
+/// See [`SetError`]: each variant says whether the value was written, except for [`SetError::Bus`], after which it may be
+/// written.
 pub fn set(
     bus: &mut BusMaster,
     id: u8,

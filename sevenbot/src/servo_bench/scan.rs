@@ -51,7 +51,7 @@ pub struct FoundServo {
     pub baud: u32,
     /// The id.
     pub id: u8,
-    /// The kind of answers.
+    /// Whether the answers come from one servo, come from several, or are damaged.
     pub answers: AnswerQuality,
 }
 

@@ -15,8 +15,7 @@ const ORDERS: u8 = register::LOCK - register::TORQUE_SWITCH + 1;
 /// Registers from the present position to the moving flag.
 const MEASURED: u8 = register::MOVING - register::PRESENT_POSITION + 1;
 
-/// Versions, settings, commands and measurements of one servo. A field that holds one register has its name in Feetech's
-/// memory table.
+/// Versions, settings, commands and measurements of one servo.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ServoInfo {
     /// The id on the servo bus.

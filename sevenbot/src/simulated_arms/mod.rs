@@ -48,7 +48,8 @@ pub use outside::{DRIVES, MEASURED, SET_POINTS, SET_VELOCITIES, WANTED};
 pub use step_error::StepError;
 use threads::share;
 
-/// Arms that a thread takes at a time. A step of them takes some 100 microseconds, much longer than taking them.
+/// The number of arms in a group, which a thread takes at a time. A step of a group takes some 100 microseconds. A thread needs
+/// much less time to take the next group.
 const GROUP: usize = 16;
 /// The time from power-up to the first step: the servos start, and the joints are measured.
 const START: time::Duration = time::Duration::from_millis(1_000);

@@ -14,7 +14,7 @@ fn arms(count: u64, threads: usize) -> SimulatedArms {
     SimulatedArms::new(&seeds, NonZeroUsize::new(threads).expect("threads"))
 }
 
-/// Targets near the pose of rest, which depend only on the arm and the step.
+/// Targets near [`REST`]. They depend only on the numbers of the arm and of the step.
 fn targets(arm: usize, step: usize) -> [f64; JOINTS] {
     let turn = |joint: usize| f64::from(u8::try_from((arm * 7 + step * 3 + joint * 5) % 11).expect("small"));
     std::array::from_fn(|joint| REST[joint] + turn(joint) - 6.0)

@@ -112,8 +112,8 @@ impl Guard {
     }
 }
 
-/// The depth in an obstacle that a way may still have: at most its least depth so far, and none once it was outside. The
-/// first pose may have any depth.
+/// The largest depth in an obstacle that the rest of a way may have: the smallest depth so far, and 0 once the way was outside.
+/// The first pose may have any depth.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Escape {
     depth_mm: Option<f64>,

@@ -15,7 +15,7 @@ use serialport::{SerialPort, TTYPort};
 /// Registers 0 to 7 of an arm with this project's firmware.
 pub(crate) const IDENTITY: [u8; 8] = [7, 30, 1, 2, 3, 4, 5, 6];
 
-/// The present position of the arm of [`moving_registers`].
+/// The present positions in [`moving_registers`].
 pub(crate) const POSE: [u8; 7] = [120, 90, 65, 90, 90, 90, 0];
 
 /// The frame of a reply.
@@ -158,7 +158,7 @@ pub(crate) fn arm_on_faulty_line(
     })
 }
 
-/// An arm that loses all writes after the first `takes`. It reports each write.
+/// An arm that loses all writes after the first `takes` writes. The receiver gets a message for each write, lost or not.
 pub(crate) fn arm_that_loses_writes_after(takes: usize) -> (String, TTYPort, mpsc::Receiver<()>) {
     let registers = moving_registers();
     let (report_write, writes) = mpsc::channel();
