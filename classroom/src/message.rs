@@ -312,7 +312,7 @@ pub struct ArmTile {
     /// Whether it has confirmed the last hold: after a stop for all, a stop by a pupil, or the end of a lease. `None`
     /// before the first hold.
     pub stop: Option<TileStop>,
-    /// The number of the pupil who has it.
+    /// The number of the pupil who has it; `None` without a lease.
     pub holder: Option<u32>,
     /// The remaining time of the lease in seconds; 0 without a lease.
     pub seconds: u32,

@@ -19,7 +19,7 @@ pub(crate) fn is_head(line: &str) -> bool {
 /// Parses the lines after the first. Errors have the line numbers of the CSV file.
 pub(crate) fn parse(text: &str) -> Result<Recording, RecordingError> {
     let (_, lines) = text.split_once('\n').unwrap_or((text, ""));
-    // One line replaces the names of the columns, so that the line numbers stay the same.
+    // The first line of the text format replaces the names of the columns, so that the line numbers stay the same.
     let head = head(FileVersion::Hundredths);
     let head = head.lines().next().unwrap_or_default();
     Recording::parse(&format!("{head}\n{}", lines.replace(',', " ")))

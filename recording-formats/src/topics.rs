@@ -31,7 +31,7 @@ pub(crate) fn metadata(topic: &str, first_time: Duration) -> BTreeMap<String, St
     entry.into_iter().collect()
 }
 
-/// The time of the first moment in the recording, from the metadata of its channel; 0 if it is absent or invalid.
+/// The time of the first moment in the recording, from the metadata of a channel; 0 if the entry is absent or invalid.
 pub(crate) fn first_time(metadata: &BTreeMap<String, String>) -> Duration {
     let milliseconds = metadata.get(FIRST_TIME).and_then(|text| text.parse().ok());
     Duration::from_millis(milliseconds.unwrap_or_default())

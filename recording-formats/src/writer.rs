@@ -28,7 +28,7 @@ use crate::messages::{
 use crate::telemetry::Telemetry;
 use crate::topics;
 
-/// The time of the recording that is written at once. At most this much is lost if the program is killed.
+/// The duration of a chunk. At most this much of the recording is lost if the program is killed.
 const CHUNK: Duration = Duration::from_secs(1);
 /// The greatest torque in the URDF, in N m. It stands for the stall torque of the servos, which is not measured.
 const STALL_TORQUE: f64 = 2.0;

@@ -1,4 +1,4 @@
-//! Reads files of bounded length, so that a wrong path such as a device fills no memory.
+//! Opens and reads files. The length of a text is bounded, so that a wrong path, such as a device, does not fill the memory.
 
 use std::fs::File;
 use std::io::{self, Read};

@@ -53,8 +53,8 @@ impl OutputFile {
     }
 }
 
-/// Writes the content of a file to standard output, unchanged: the printer would remove escape sequences from it. The name of
-/// a `binary` format, which a terminal cannot show, is for the error.
+/// Writes the content of a file to standard output, unchanged: the printer would remove escape sequences from it. `binary` is
+/// the name of the format if a terminal cannot show it. Then the function fails if standard output is a terminal.
 pub(crate) fn write_to_stdout(content: &[u8], binary: Option<&str>) -> Result<(), CommandError> {
     let mut stdout = io::stdout();
     if let Some(name) = binary.filter(|_| stdout.is_terminal()) {

@@ -19,7 +19,7 @@ pub(crate) struct ProgressWatch {
 }
 
 impl ProgressWatch {
-    /// Needs an [`Interrupt`], because only that catches Ctrl-C.
+    /// Needs an [`Interrupt`], because only [`Interrupt::catch`] catches Ctrl-C.
     pub(crate) const fn new(_: Interrupt) -> Self {
         Self { bar: None }
     }

@@ -1,7 +1,7 @@
 //! A flood of one client delays the others by less than 10 ms, in virtual time. Also tests frames for which the hub has no
 //! room.
 //!
-//! Pseudo-terminals and TCP have the same client, which sends frames.
+//! The clients with frames stand for programs at pseudo-terminals and over TCP: the server uses the same client for both.
 
 #![allow(clippy::expect_used, clippy::indexing_slicing, clippy::unwrap_used)] // A panic is a failed test.
 

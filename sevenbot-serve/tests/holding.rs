@@ -276,7 +276,7 @@ fn a_hold_that_cannot_restore_what_it_changed_is_told() {
     }
 }
 
-/// The port is lost between the targets and the period.
+/// The port is lost after the targets were written, and before the period is restored.
 #[test]
 fn a_period_that_an_outage_kept_from_the_arm_is_restored() {
     let mut world = streaming_world();

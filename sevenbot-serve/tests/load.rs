@@ -1,4 +1,4 @@
-//! Ten programs under load, in virtual time: nothing is lost and nothing is crossed.
+//! Programs under load, in virtual time: no reply is lost, and each program gets the replies to its own requests.
 //!
 //! `SERVE_LOAD_SECONDS` sets the length; 3600 is an hour.
 

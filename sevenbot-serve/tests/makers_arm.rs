@@ -82,7 +82,7 @@ fn it_is_held_in_whole_degrees_behind_a_brake() {
     assert_eq!(world.writes, expected, "no register of the extended block");
 }
 
-/// A program treats it as an arm with this project's firmware.
+/// A program writes the set-point period, as it would for an arm with this project's firmware.
 #[test]
 fn it_has_no_period_that_a_hold_restores() {
     let mut world = World::new();

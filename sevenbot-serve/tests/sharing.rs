@@ -162,7 +162,7 @@ fn each_program_reads_offsets_as_it_writes_them() {
     }
 }
 
-/// M4: only an accepted write of map 2.1 stops the reports of map 2.2. The arm refuses the writes of this test.
+/// M4: only an accepted write of map 2.1 stops the reports of map 2.2. The arm refuses each request in `refused`.
 #[test]
 fn a_write_that_the_arm_refuses_stops_no_reports() {
     let far = [0x05, 0xF4, 0x04, 0xB9, 0x04, 0x32, 0x80, 0x80, 0x7F];
@@ -324,8 +324,8 @@ fn a_damaged_reply_is_asked_for_again() {
     assert_eq!(world.take(2), [(DEVICE_CODE.address, vec![7])]);
 }
 
-/// The link tells equal reads apart by their length. A read of 255 registers cannot be made longer, so a lost reply cannot be
-/// told from the reply to the read after it.
+/// While a read has no reply, an equal read asks for a few registers more, so that the replies differ. A read of 255 registers
+/// cannot be made longer. So the reply to the next read may count as the reply that was lost.
 #[test]
 fn a_damaged_reply_with_all_registers_costs_no_program_its_own() {
     let mut world = World::new(3);

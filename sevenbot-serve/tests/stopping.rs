@@ -1,5 +1,5 @@
-//! A stop goes before everything else, and ends the streams of other clients. A request that is late, or whose sender is gone,
-//! is not carried out.
+//! A stop goes before everything else, and ends the streams of other clients. A request that is late, or whose
+//! sender's connection broke, is not carried out.
 //!
 //! `SERVE_STOPS` sets the number of stops beside each attack; 1000 take some minutes.
 
@@ -245,7 +245,8 @@ fn a_hold_under_way_does_not_overwrite_a_stop_that_comes_meanwhile() {
     }
 }
 
-/// A joint that got a target soon after power-up moves as soon as it is measured. Until then there is nothing to hold it at.
+/// A joint that got a target soon after power-up moves as soon as it is measured. Until then no position is known at which it
+/// could hold.
 #[test]
 fn a_command_stops_an_arm_that_was_just_switched_on() {
     for delay in (50..300).step_by(10) {
@@ -277,7 +278,7 @@ fn commands_without_a_pause_stop_the_arm() {
     assert_eq!(world.arm.registers().get(TARGET_POSITION.address), held);
 }
 
-/// With a set-point period a fine target is the next point of a stream, up to two seconds later.
+/// With a set-point period, a fine target is the next point of a stream. The joint may reach it two periods later: 2 s here.
 #[test]
 fn a_command_stops_a_stream_with_a_long_period() {
     let mut world = World::new(2);

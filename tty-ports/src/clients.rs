@@ -1,8 +1,8 @@
 //! Uses inotify to count the clients of each port. A client is a program that has the terminal of the port open.
 //!
 //! The program itself keeps its ports open, so the kernel does not report that the last client has closed a port. inotify
-//! reports each open and each close. But it merges equal reports that follow each other unread: two opens in a row would
-//! count as one. So the directory of the terminals is watched too. Each report of a terminal is then followed by a report
+//! reports each open and each close. But it merges consecutive equal reports that have not been read yet: two opens in a row
+//! would count as one. So the directory of the terminals is watched too. Each report of a terminal is then followed by a report
 //! of the directory, and no reports of the terminal are merged.
 //!
 //! The queue of reports is bounded, and after an overflow the counts are wrong. Then the open files of all processes are
@@ -44,7 +44,7 @@ struct WatchedPort {
     terminal: PathBuf,
     /// Number of clients. After an overflow, 1 stands for any number.
     count: usize,
-    /// Reports were lost since the port had no client.
+    /// Reports were lost, and [`WatchedPort::recount`] has not found the port without a client since.
     has_lost_count: bool,
     /// The count may be wrong until [`WatchedPort::recount`].
     is_stale: bool,

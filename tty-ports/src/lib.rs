@@ -1,6 +1,6 @@
 //! Non-blocking terminals: pseudo-terminals that a program offers to others, and serial ports that it opens.
 //!
-//! Linux only, because inotify reports when clients open and close a pseudo-terminal.
+//! Linux only, because inotify is used to count the clients of a pseudo-terminal.
 //!
 //! ```
 //! use tty_ports::pty::Pty;

@@ -65,7 +65,7 @@ pub struct Symlink {
     _lock: LinkLock,
 }
 
-/// The lock of a path: an abstract socket, which has no file and which the kernel closes with its process.
+/// The lock of a path: an abstract socket, which has no file, and which the kernel closes when the process ends.
 #[derive(Debug)]
 struct LinkLock {
     /// Another program, or another [`Symlink`] of this program, holds the lock.

@@ -73,8 +73,8 @@ pub(crate) fn backup(session: &mut Session, args: &BackupArgs) -> Result<(), Com
     Ok(())
 }
 
-/// Writes a file. Without `may_replace` it must not exist. With it, an old regular file is replaced when the new one is
-/// complete, and anything else, such as a pipe or a link, is written to directly.
+/// Writes a file. Without `may_replace` the file must not exist. With `may_replace`, an old regular file is replaced when the
+/// new one is complete, and anything else, such as a pipe or a link, is written to directly.
 fn write_whole(path: &Path, text: &str, may_replace: bool) -> Result<(), CommandError> {
     let is_special = fs::symlink_metadata(path).is_ok_and(|there| !there.is_file());
     if may_replace && is_special {
@@ -82,7 +82,7 @@ fn write_whole(path: &Path, text: &str, may_replace: bool) -> Result<(), Command
     }
     if may_replace {
         let beside = path.with_extension("toml.new");
-        // Remove what an earlier run left. This also removes a link that another user planted, so that it is not followed.
+        // Remove a file that an earlier run left. This also removes a link that another user planted, so that it is not followed.
         let _ = fs::remove_file(&beside);
         return File::create_new(&beside)
             .and_then(|mut file| file.write_all(text.as_bytes()))

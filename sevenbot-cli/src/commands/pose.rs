@@ -244,7 +244,7 @@ fn put_back<T>(
     reached: &Result<T, CommandError>,
 ) -> Result<(), CommandError> {
     let restored = match reached {
-        // The arm holds, though the duration of the move to its own place may still run.
+        // The arm holds. Do not wait: the duration of the move to the held position may still run.
         Err(CommandError::Interrupted) => before.put_back_at_once(arm),
         _ => before.put_back(arm),
     };
@@ -266,7 +266,7 @@ enum ReachedPose {
     Hundredths(FinePositions),
 }
 
-/// The positions in hundredths if an argument has a fraction, and the arm measures them.
+/// The positions in hundredths if an argument has a fraction and the arm measures hundredths; otherwise `whole`.
 fn measured(arm: &mut Arm, goals: &[PoseArg], whole: [u8; 7]) -> Result<ReachedPose, CommandError> {
     let is_whole = goals.iter().all(|goal| match goal {
         PoseArg::At(angle) => angle.is_whole(),

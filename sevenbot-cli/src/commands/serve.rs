@@ -174,7 +174,7 @@ pub(super) fn run_server(
 }
 
 /// The Unix socket and the name of the server, for other programs of this user. `None` if this user has no private directory
-/// for it.
+/// for the socket, or if its path would be too long.
 fn local(args: &ServeArgs) -> Option<LocalServer> {
     let name = args.name.clone();
     match &args.socket {

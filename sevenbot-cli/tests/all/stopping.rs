@@ -98,7 +98,7 @@ fn ctrl_c_during_a_change_of_the_baud_rate_closes_the_eeprom_lock() {
     let tool = command(&port, &["baud", "57600"]).spawn().unwrap();
     writes.recv_timeout(Duration::from_secs(60)).expect("the lock is opened");
     assert!(Command::new("kill").args(["-INT", &tool.id().to_string()]).status().unwrap().success());
-    // The tool handles the signal in a thread of its own. Until then the arm does not answer.
+    // The tool handles the signal in a thread of its own. The arm answers only after this pause.
     std::thread::sleep(Duration::from_secs(1));
     resume.send(()).unwrap();
     let output = tool.wait_with_output().unwrap();

@@ -16,7 +16,7 @@ use super::request::WholeRequest;
 pub enum Admission {
     /// The request waits for its turn.
     Queued,
-    /// The request is dropped: the client has too many.
+    /// The request is dropped: too many requests of the client wait already.
     NoRoom,
     /// No arm answers: the request is dropped. A read of the server's own registers still gets a reply, and a stop is still
     /// sent to an arm that fell silent.
@@ -69,7 +69,8 @@ impl Hub {
         Admission::Queued
     }
 
-    /// Stops the arm for a client, as 1 in register 239 does. [`Hub::hold_outcome`] has the outcome.
+    /// Stops the arm for a client, as 1 in register 239 does. [`Hub::hold_outcome`] has the outcome. Does nothing without an
+    /// arm, or if the server is read-only.
     pub fn stop_arm(&mut self, now: Instant, id: ClientId) -> Admission {
         if !self.has_arm() && !self.is_silent() {
             return Admission::NoArm;

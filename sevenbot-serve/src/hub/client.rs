@@ -22,7 +22,8 @@ pub(crate) const MOST_WAITING: usize = 20;
 pub const LONGEST_WAIT: Duration = Duration::from_millis(200);
 /// Reports that wait for a client to take them. More are dropped.
 const MOST_REPORTS: usize = 4;
-/// Bytes on the line, replies included, that may wait for a client: 90 ms at 115 200 baud. One request is always allowed.
+/// Bytes that the waiting requests of a client and their replies may take on the line: 90 ms at 115 200 baud. One request is
+/// always allowed.
 const MOST_WAITING_BYTES: usize = 1_024;
 /// A client may send this many urgent requests in each period. More wait like other requests, so that a flood delays no other
 /// client.

@@ -92,7 +92,7 @@ impl Driver {
         Ok(())
     }
 
-    /// Ends the driving of the client `of`, which hands over or is gone. `None`: the arm was stopped, and no client drives.
+    /// The client `of` no longer drives: it hands over or is gone. `None`: no client drives, because the arm was stopped or lost.
     pub(crate) fn end(&mut self, of: Option<ClientId>) {
         self.last = self.last.filter(|&(id, _)| of.is_some_and(|of| of != id));
     }

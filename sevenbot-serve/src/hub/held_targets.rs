@@ -17,7 +17,7 @@ const LONGEST_BRAKING: u16 = 1_500;
 pub(crate) struct HeldTargets(Angles);
 
 impl HeldTargets {
-    /// Notes a write with this intent and these targets, which goes to the arm.
+    /// Notes a write to the arm, with this intent and these targets.
     pub(crate) fn note_write(&mut self, intent: Intent, targets: &Angles) {
         match intent {
             Intent::Setting => {}

@@ -245,8 +245,8 @@ fn outcome(hold: &ArmHold, address: u8, values: &[u8]) -> HoldOutcome {
     }
 }
 
-/// The speeds without the brake. A joint with another speed keeps it: it did not get the brake, got a speed of a client since,
-/// or belongs to an arm that restarted.
+/// The speeds in `found`, with the speed of the brake replaced by the speed in `before`. A joint with another speed keeps it:
+/// it did not get the brake, got a speed of a client since, or belongs to an arm that restarted.
 fn restored(found: &[u8], before: &[u8]) -> Vec<u8> {
     let rows = found.iter().zip(before);
     rows.map(|(&found, &before)| if found == BRAKE { before } else { found }).collect()

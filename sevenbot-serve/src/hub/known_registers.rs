@@ -1,8 +1,8 @@
 //! The registers of the arm that the hub knows without a read. The EEPROM lock and register 20 decide which writes the arm
-//! refuses, and how it shows offsets before a write. A hold restores the speeds.
+//! refuses, and in which form a client that has written nothing reads the offsets. A hold restores the speeds.
 //!
 //! They are read when the arm is found. After that only the hub writes to the arm. The hub does not know whether the settings
-//! storage is full, nor whether the controller restarted, which locks the EEPROM.
+//! storage is full, nor whether the controller restarted. A restart locks the EEPROM.
 
 use motion_core::reach;
 use protocol_core::registers::map::{
@@ -103,8 +103,8 @@ impl KnownRegisters {
         }
     }
 
-    /// The map whose form offsets have for a client that has written nothing ([M5](protocol_core::decisions#m5),
-    /// [M6](protocol_core::decisions#m6)).
+    /// The map that determines the form of the offsets for a client that has written nothing
+    /// ([M5](protocol_core::decisions#m5), [M6](protocol_core::decisions#m6)).
     pub(crate) fn form_before_writes(&self) -> Map {
         if self.0.get(OPTIONS.address) & option::BIASED_OFFSETS == 0 { Map::V22 } else { Map::V21 }
     }

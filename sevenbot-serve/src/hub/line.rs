@@ -15,11 +15,12 @@ use super::client::{Client, Event};
 use super::client_id::ClientId;
 use super::request::{WholeRequest, reply_bytes};
 
-/// For reads of clients. If a reply is late, the read is repeated after 100 ms or more, unless something was written since. So
-/// a lost frame delays its client, and those that wait for the line, only by that time. The read is given up after 3 s only,
-/// because a busy computer may not run the arm's side of the port for a second.
+/// For reads of clients. If a reply is later than recent delays explain, the read is repeated, unless something was written
+/// since. So a lost frame delays its client, and the clients that wait for the line, only a little. The read is given up after
+/// 3 s only, because a busy computer may not run the arm's side of the port for a second.
 const CLIENT_PATIENCE: Patience = Patience { attempts: 3, timeout: Duration::from_millis(1_000) };
-/// For reads of a hold, which sends another one every 100 ms, after the brake. The reply to each may come within 1 s.
+/// For reads of a hold. Until a reply comes, the hold itself sends another read every 100 ms, after the brake. The reply to each
+/// read may be up to 1 s late.
 const HOLD_PATIENCE: Patience = Patience { attempts: 10, timeout: Duration::from_millis(100) };
 /// For the other reads of the hub, which the hub itself repeats.
 const OWN_PATIENCE: Patience = Patience { attempts: 1, timeout: Duration::from_millis(1_000) };
@@ -88,7 +89,7 @@ impl Line {
         self.output.clear();
     }
 
-    /// Ends all reads without a reply. The bytes that wait for the port are kept: they are a stop, or a part of a frame.
+    /// Ends all pending reads: they get no reply. Keeps the bytes that wait for the port: they are a stop, or a part of a frame.
     pub(crate) fn end_reads(&mut self) {
         self.link.reset();
     }
@@ -116,7 +117,7 @@ impl Line {
         self.link.bytes(now, bytes);
     }
 
-    /// The end of a read, and its owner.
+    /// The next end of a read, and the owner of this read.
     pub(crate) fn next_event(&mut self, now: Instant) -> Option<(Owner, Event)> {
         self.advance(now);
         self.events.pop_front()
@@ -156,7 +157,7 @@ impl Line {
         }
     }
 
-    /// Does the port take no bytes?
+    /// Do so many bytes wait for the port ([`STUCK_OUTPUT`]) that it counts as stuck?
     pub(crate) const fn is_stuck(&self) -> bool {
         self.output.len() >= STUCK_OUTPUT
     }

@@ -7,7 +7,7 @@
 //!               the line least
 //! ```
 //!
-//! * A client has at most one read without a reply; its later requests wait behind it, so their order is kept.
+//! * While a read of a client has no reply, the client's later requests wait, so their order is kept. Urgent ones do not wait.
 //! * The report registers belong to each client (`own_registers`). The arm sends no reports: the sampler reads the
 //!   arm once, at the highest frequency that any client wants, and all clients share the values.
 //! * Without an arm requests are dropped. A request that waited could move an arm that a person just plugged in. With an arm, a

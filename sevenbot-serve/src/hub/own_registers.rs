@@ -51,8 +51,8 @@ impl OwnRegisters {
         *self != before
     }
 
-    /// The map whose form of the offsets this read has to get: the map of the client's last write, or `before_writes`. `None`
-    /// if the read has no offsets.
+    /// The map that determines the form of the offsets in the reply to this read: the map of the client's last write, or
+    /// `before_writes`. `None` if the read has no offsets.
     pub(crate) fn form_of_read(&self, address: u8, count: u8, before_writes: Map) -> Option<Map> {
         covers(&OFFSET, address, count.into()).then_some(self.last_map.unwrap_or(before_writes))
     }

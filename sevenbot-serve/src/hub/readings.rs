@@ -12,7 +12,7 @@ use protocol_core::time::{Duration, Instant};
 
 use super::angles::{UNMEASURED, angles_in, limits_in};
 
-/// Number of readings that are kept. A client may read again before it writes what it read first.
+/// Number of readings that are kept. A client may read again before it writes the positions of an earlier reading.
 const KEPT: usize = 8;
 /// Readings older than this no longer tell where the arm is.
 const FRESH: Duration = Duration::from_millis(1_000);

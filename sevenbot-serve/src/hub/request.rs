@@ -23,7 +23,7 @@ pub enum WholeRequest {
         /// One byte per register, at most 255.
         values: Vec<u8>,
     },
-    /// Writes between two reads of the same registers, to find out what they change. No other client's request comes
+    /// Writes between two reads of the same registers, to find out what the writes change. No other client's request comes
     /// between them. Gives two events.
     WritesBetweenReads {
         /// The map that the writes are in ([M1](protocol_core::decisions#m1)).

@@ -5,7 +5,7 @@ use protocol_core::time::{Duration, Instant};
 
 use super::own_registers::OwnRegisters;
 
-/// How early a report may come: half of the shortest period of 10 ms.
+/// How early a report may come: half of the shortest period, which is 10 ms.
 const EARLY: Duration = Duration::from_millis(5);
 
 /// When a stream is due next.

@@ -32,7 +32,7 @@ pub(crate) struct Shares {
 
 impl Shares {
     /// The tag at which a client that was idle starts: the lowest tag of those that wait. The tag of the last request may be
-    /// too high: many short requests of one client run ahead of the others by the length of a long one.
+    /// too high: a client with short requests can be ahead of the others by the length of a long request.
     pub(crate) fn floor(&self, waiting: impl Iterator<Item = Share>) -> u64 {
         waiting.map(|share| share.tag).min().unwrap_or(self.current)
     }

@@ -9,9 +9,9 @@
 //!
 //! The arm's watchdog sees the frames of all clients, and the samples. So once the client has been silent for the time of its
 //! watchdog, the hub does what the arm would do. A client that has left is silent, too. The arm's own watchdog acts if the
-//! server fails. It is set to [`LEAST_OF_ARM`] at least. A shorter one could act in a short pause of a busy server: it would
-//! hold joints that still brake after a stop at their set-points, not where the stop was confirmed. Clients read the value that
-//! a client wrote.
+//! server fails. It is set to [`LEAST_OF_ARM`] at least. A shorter one could act in a short pause of a busy server: joints
+//! that still brake after a stop would then hold at their set-points, not where the stop was confirmed. A read of register 186
+//! returns the value that the client wrote.
 
 use protocol_core::registers::map::{HOST_WATCHDOG, WATCHDOG_ACTION};
 use protocol_core::time::{Duration, Instant};
@@ -94,7 +94,7 @@ impl ClientWatchdog {
         Some(watched.action)
     }
 
-    /// When the client has been silent for too long.
+    /// When the action is due; [`Instant::FAR_FUTURE`] without a watchdog, or if it has acted in this silence.
     pub(crate) fn due(&self) -> Instant {
         let watched = self.watched.filter(|watched| !watched.is_silent);
         watched.map_or(Instant::FAR_FUTURE, |watched| watched.heard + watched.timeout())

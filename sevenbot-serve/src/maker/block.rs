@@ -73,8 +73,8 @@ fn three(message: &Value, name: &str) -> Result<[f64; 3], String> {
     numbers.ok_or_else(|| format!("{name} array must have 3 numbers"))
 }
 
-/// Whole millimetres plus 1024, high byte first. A position beyond the range of the registers is clamped. It is out of reach at
-/// the limit, too.
+/// Whole millimetres plus 1024, high byte first. A position beyond the range of the registers is clamped to it, and
+/// is still out of reach.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the type")]
 fn position(millimetres: [f64; 3]) -> [u8; 6] {
     let [x, y, z] = millimetres.map(|value| {

@@ -18,7 +18,7 @@ use super::block::has_solution;
 use super::command::{MakerCommand, MakerCommandError};
 use crate::hub::{Admission, ClientId, Event, HoldOutcome, Hub, WholeRequest};
 
-/// Answers that may wait for a client to take them. Its commands wait meanwhile.
+/// Answers that may wait for a client to take them. While there are this many, its commands wait.
 const MOST_ANSWERS: usize = 8;
 /// Commands that may wait. A pose takes 1.2 ms at 115 200 baud, and a target is dropped after 200 ms: a longer queue of targets would
 /// hold some that are dropped anyway.
@@ -165,7 +165,7 @@ impl MakerClient {
                 self.answer(false, &done_or_refused(done, admission));
             }
             (MakerCommand::InverseKinematics { .. }, refused)
-                // In these two cases the command ends later, with two events.
+                // A command that is queued or finds no arm ends later, with two events.
                 if !matches!(refused, Admission::Queued | Admission::NoArm) =>
             {
                 self.answer(false, &done_or_refused("", refused));

@@ -1,9 +1,9 @@
 //! Places limit the number of connections: some are for connections that have not shown their token yet, others for clients.
 //!
 //! If all places for connections without a token are taken, the oldest of these connections loses its place to the next one. So
-//! connections that send nothing do not keep out a client that sends its token at once. After wrong tokens, the next ones of
-//! the same address are checked one after the other, each after a delay. While there are more connections than places, no other
-//! one is accepted, because each takes file descriptors.
+//! connections that send nothing do not keep out a client that sends its token at once. After wrong tokens, the next tokens
+//! from the same address are checked one after the other, each after a delay. While there are more connections than places, no
+//! other one is accepted, because each takes file descriptors.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::net::IpAddr;

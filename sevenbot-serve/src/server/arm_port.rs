@@ -66,7 +66,7 @@ impl ArmPort {
         }
     }
 
-    /// Ends when the port has bytes, or with `has_output`, when it takes bytes.
+    /// Ends when the port has bytes to read, or, if `has_output`, when the port takes bytes.
     async fn is_ready(&self, has_output: bool) {
         let ArmPortState::Open(port, _) = &self.state else { return std::future::pending().await };
         // Ignore an error here: the next read or write returns it.
@@ -166,7 +166,7 @@ impl ArmPort {
         self.notify(Notice::ArmLost { port: self.path.clone(), reason: reason.to_owned() }, notify);
     }
 
-    /// While ports are searched, only the first notice without an arm is passed.
+    /// Passes a notice, unless it equals the last one. While a search finds no arm, passes only the first notice.
     fn notify(&mut self, notice: Notice, notify: &mut dyn FnMut(Notice)) {
         let is_found = |notice: &Notice| matches!(notice, Notice::ArmFound(_));
         let is_known = match &self.last_notice {

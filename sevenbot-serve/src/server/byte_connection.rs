@@ -22,7 +22,7 @@ pub(super) trait ByteStream: AsyncRead + AsyncWrite + Unpin + Send {}
 
 impl<S: AsyncRead + AsyncWrite + Unpin + Send> ByteStream for S {}
 
-/// The client was disconnected, because its first byte is not that of a frame.
+/// The client was disconnected, because its first byte does not begin a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct NoFrames;
 
@@ -37,7 +37,7 @@ pub(super) struct First {
 /// Serves a client until it ends.
 ///
 /// # Errors
-/// The client's first byte is not that of a frame.
+/// The client's first byte does not begin a frame.
 pub(super) async fn serve(
     shared: &Arc<Shared>,
     stream: impl ByteStream,
@@ -91,7 +91,7 @@ pub(super) async fn serve(
     Ok(())
 }
 
-/// A client whose first byte has to be that of a frame.
+/// A client whose first byte has to be [`FIRST_BYTE`].
 struct FrameStream {
     session: FrameSession,
     has_begun: bool,

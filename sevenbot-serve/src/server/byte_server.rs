@@ -91,7 +91,8 @@ impl ByteServer {
         })
     }
 
-    /// Reads the first line. Returns the bytes after it; `None` if it is not the token.
+    /// Reads the first line, and checks it after the delay that earlier wrong tokens cause. Returns the bytes after the line;
+    /// `None` if the line is not the token, or if the connection ends or is refused.
     async fn read_token(
         &self,
         stream: &mut Box<dyn ByteStream>,

@@ -7,7 +7,7 @@ use super::admission::Places;
 const MOST: usize = 64;
 /// Descriptors that one of each kind takes: over the network the socket and its [`super::breakage::Breakage`].
 const OF_EACH_KIND: usize = 2 + 2 + 1;
-/// For the arm's port, for files, and for connections that are accepted only to be closed.
+/// Descriptors for the arm's port, for files, and for connections that are accepted only to be closed.
 #[cfg(unix)]
 const RESERVED: usize = 16;
 

@@ -9,10 +9,10 @@ use tokio::net::{TcpListener, TcpStream};
 
 use super::start_error::StartError;
 
-/// Bytes that the kernel keeps for a client that does not read; the kernel doubles it. Its default of megabytes would
-/// hand old reports to a slow client.
+/// Bytes that the kernel keeps for a client that does not read; the kernel doubles the value. With the default of some
+/// megabytes, a slow client would get old reports.
 pub(super) const SEND_BUFFER: usize = 4_096;
-/// Bytes that the kernel keeps of a client whose bytes have to wait; the kernel doubles it.
+/// Bytes that the kernel keeps of a client whose bytes have to wait; the kernel doubles the value.
 const RECEIVE_BUFFER: usize = 4_096;
 /// A peer that is silent for this long is asked whether it is still there.
 const KEEPALIVE_IDLE: Duration = Duration::from_secs(10);
@@ -21,7 +21,7 @@ const KEEPALIVE_PROBES: u32 = 3;
 /// A peer that takes no byte for this long is gone. Other systems than Linux decide that by themselves.
 #[cfg(target_os = "linux")]
 const USER_TIMEOUT: Duration = Duration::from_secs(60);
-/// Pause after a failed accept, as with too many open files.
+/// Pause after a failed accept, for example because too many files are open.
 pub(super) const AFTER_ERROR: Duration = Duration::from_millis(100);
 
 /// Opens a TCP port.

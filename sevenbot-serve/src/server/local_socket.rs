@@ -36,7 +36,7 @@ impl LocalSocket {
             Ok(_) => fs::remove_file(path).map_err(failed)?,
             Err(_) => {}
         }
-        // With this mask, other users cannot open the file at any time.
+        // The mask applies when the file is created, so other users can never open it.
         let mask = umask(Mode::RWXG | Mode::RWXO | Mode::XUSR);
         let listener = UnixListener::bind(path);
         umask(mask);

@@ -8,7 +8,7 @@
 //! ```
 //!
 //! One task serves the arm's port, and one each connection. All run in one thread: the arm's line carries at most some thousand
-//! frames a second, which is little work for it.
+//! frames a second, which is little work for one thread.
 
 mod access;
 mod admission;

@@ -37,7 +37,7 @@ pub enum Notice {
 pub enum RefusalReason {
     /// Its token is wrong.
     WrongToken,
-    /// There are too many clients.
+    /// There are too many clients, or too many connections of its address wait for the check of their tokens.
     Full,
     /// It does not speak frames, but for example HTTP.
     NoFrames,

@@ -41,7 +41,7 @@ impl Pulse {
         self.last = now;
     }
 
-    /// The earliest time at which bytes can have been sent that arrive at `now` while the server waits for them.
+    /// The earliest time at which bytes can have been sent if they arrive at `now` while the server waits for them.
     fn earliest(&self, now: Instant) -> Instant {
         self.gap.unwrap_or(if now - self.last >= MISSED { self.last } else { now })
     }
@@ -67,8 +67,8 @@ impl Shared {
         }
     }
 
-    /// The earliest time at which bytes can have been sent that arrive now while the server waits for them: now, or the start
-    /// of a pause in which the system did not run the server.
+    /// The earliest time at which bytes can have been sent if they arrive now while the server waits for them: now, or the
+    /// start of a pause in which the system did not run the server.
     pub(super) fn earliest(&self) -> Instant {
         let now = self.now();
         lock(&self.pulse).earliest(now)
@@ -78,7 +78,7 @@ impl Shared {
         Instant::from_micros(u64::try_from(self.start.elapsed().as_micros()).unwrap_or(u64::MAX))
     }
 
-    /// For the task of the arm's port: uses the hub, and wakes the clients that have news.
+    /// Uses the hub, and wakes the clients that have news.
     pub(super) fn with_hub<T>(&self, work: impl FnOnce(&mut Hub, Instant) -> T) -> T {
         let mut hub = lock(&self.hub);
         let done = work(&mut hub, self.now());

@@ -35,7 +35,7 @@ pub struct ClassConfig {
     pub address: SocketAddr,
     /// The files of the page, and of the teacher's screen at `teacher.html`.
     pub files: PageFiles,
-    /// What pupils have to type; `None`: nothing, which is for this computer only.
+    /// The code that pupils have to type. `None`: no code, only for a server that other computers cannot reach.
     pub code: Option<String>,
     /// The secret that the teacher's screen needs, `/teacher?token=SECRET`.
     pub secret: String,

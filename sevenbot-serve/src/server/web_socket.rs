@@ -92,7 +92,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Messages<S> {
         }
     }
 
-    /// Bytes that were read since the last call.
+    /// Returns the bytes that were read since the last call. The count for [`MOST_UNFINISHED`] begins again at 0.
     fn take_count(&self) -> usize {
         self.unfinished.swap(0, Ordering::Relaxed)
     }
@@ -170,7 +170,7 @@ pub(super) trait Session {
     fn close(self, end: End);
 }
 
-/// Frames in binary messages, as bytes over TCP have them. A frame may be spread over messages, and a message may hold several.
+/// Frames in binary messages: the same bytes as over TCP. A frame may be spread over messages, and a message may hold several.
 impl Session for FrameSession {
     fn advance(&mut self, can_send: bool) -> Option<Message> {
         self.exchange();

@@ -39,7 +39,7 @@ pub(crate) struct ArmThread {
     pub(crate) arm: Option<Arm>,
     /// The state after the last step of the tip; `None` before the first.
     pub(crate) jog: Option<Jog>,
-    /// Limits the steps of the tip; `None`: no limits.
+    /// Limits the steps of the tip, and warns of steps of a joint; `None`: neither.
     pub(crate) guard: Option<Guard>,
 }
 

@@ -95,7 +95,7 @@ impl TipArrival {
 }
 
 impl MeasuredTip {
-    /// From the measured angles and the requested tip.
+    /// The end of a move to the point `asked`, from the measured angles.
     pub(super) fn of(pose: MeasuredPose, asked: Vector) -> Self {
         let (positions_degrees, tip) = (pose.degrees(), pose.tip_pose().tip);
         Self { positions_degrees, tip_mm: components(tip, 100.0), miss_mm: rounded((tip - asked).length()) }

@@ -54,7 +54,7 @@ impl Outputs {
         self.mcap.is_some()
     }
 
-    /// Adds a moment, unless it is not later than the last one.
+    /// Adds a moment. Ignores a moment that is less than a millisecond later than the last one.
     pub(crate) fn add(&mut self, moment: &Moment, telemetry: &Telemetry) -> Result<(), CommandError> {
         let Some(line) = self.lines.add(moment) else { return Ok(()) };
         if let Some((_, file)) = &mut self.text {

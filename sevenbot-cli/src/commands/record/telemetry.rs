@@ -10,13 +10,13 @@ use sevenbot::{Angle, Arm, Error, FineAngle, Health, Snapshot, Span};
 
 /// Targets, positions, velocities and loads.
 const REGISTERS: Span = Span::between(&FINE_TARGET, &LOAD);
-/// Bits of a question and its answer on the line: 7 bytes each around the values, ten bits a byte.
+/// Bits of a question and its answer on the line: 7 bytes for each frame and one for each value, at ten bits a byte.
 const BITS: u32 = 10 * (7 + 7 + REGISTERS.count() as u32);
 /// Reads use the line for at most 1 / `SHARE_OF_LINE` of the time. The rest is for reports.
 const SHARE_OF_LINE: u32 = 2;
 /// The time between two reads of the health, which has more registers.
 const HEALTH_PERIOD: Duration = Duration::from_secs(1);
-/// A read of the health takes as long on the line as this many reads of the telemetry.
+/// A read of the health takes at most as long on the line as this many reads of the telemetry.
 const ANSWERS_PER_HEALTH: u32 = 4;
 
 /// Reads targets, velocities and loads, and the health once a second.

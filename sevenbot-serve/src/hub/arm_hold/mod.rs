@@ -27,8 +27,8 @@ use super::held_targets::HeldTargets;
 const MOST_ROUNDS: u8 = 10;
 /// A read without a reply is repeated after this time. The brake is written again before it.
 const REPEAT_PERIOD: Duration = Duration::from_millis(100);
-/// How often a hold is repeated while a joint whose set-point moves was not measured yet. The repeats take 0.2 s or more, and
-/// measuring takes 0.2 s after power-up.
+/// How often a hold is repeated while a joint whose set-point moves was not measured yet. All repeats together take at least
+/// 0.2 s, and an arm takes 0.2 s to measure its joints after power-up.
 const MOST_REPEATS: u8 = 40;
 
 /// A frame to write: the first register, and the values.
@@ -142,7 +142,7 @@ impl ArmHold {
         Some((first.address, last.address + last.count - first.address))
     }
 
-    /// When [`Self::next_read`] has a read.
+    /// The time from which on [`Self::next_read`] returns a read.
     pub(crate) fn due(&self) -> Instant {
         self.repeat_at.unwrap_or(Instant::ZERO)
     }

@@ -1,4 +1,4 @@
-//! The open serial port of the arm, which never waits: on Linux by its descriptor, elsewhere by a thread.
+//! The open serial port of the arm. Reads and writes do not wait: on Linux they use its descriptor, elsewhere a thread.
 
 #[cfg(target_os = "linux")]
 mod descriptor;

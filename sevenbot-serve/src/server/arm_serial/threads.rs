@@ -1,5 +1,5 @@
 //! The port served by a thread, for systems that do not report the readiness of serial ports. The thread reads and writes in
-//! turn: on Windows a port does one of both at a time, so a read that waits delays a write.
+//! turn: on Windows a port does only one of the two at a time, so a read that waits delays a write.
 //!
 //! ```text
 //!   port ──▶ thread ──▶ inbox ──▶ read()
