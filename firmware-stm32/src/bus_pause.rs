@@ -35,7 +35,7 @@ impl PauseWait {
 mod tests {
     use super::*;
 
-    /// The time at which the wait ends, in microseconds. `received` and `is_sending` give the state at a time.
+    /// How long the wait takes, in microseconds. `received` and `is_sending` give the state at a time after its start.
     fn ends(received: impl Fn(u32) -> usize, is_sending: impl Fn(u32) -> bool) -> u32 {
         let start = u32::MAX - 100;
         let mut pause = PauseWait::new(start, 1_000, 5_000);

@@ -5,8 +5,8 @@
 //! ```
 //!
 //! A ready crystal may be the wrong one: 12 MHz with the divider for 8 MHz drives the PLL to 504 MHz, above its limit of 432
-//! MHz (DS8626, main PLL characteristics). So the firmware measures it before it uses the PLL. The measurement is as exact as
-//! the internal oscillator: 1 % at 25 degrees Celsius, 4 % from -10 to 85 (DS8626, HSI oscillator characteristics).
+//! MHz (DS8626, main PLL characteristics). So the firmware measures the crystal before it uses the PLL. The measurement is as
+//! exact as the internal oscillator: 1 % at 25 degrees Celsius, 4 % from -10 to 85 (DS8626, HSI oscillator characteristics).
 
 use crate::clock_rates::INTERNAL_HZ;
 

@@ -5,7 +5,7 @@
 //! its instructions from the same bank. Interrupts run between two words. Sectors are erased only at start, before the
 //! servos are controlled.
 //!
-//! Each programmed word is read back. A word that differs is an error, as in the emulator, where no cell changes. A write
+//! Each programmed word is read back, and a difference is an error. It occurs in the emulator, where no cell changes. A write
 //! also updates the data cache, so the cache is flushed before the read.
 //! Tests: `flash/tests.rs`.
 

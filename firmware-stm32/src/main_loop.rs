@@ -74,7 +74,7 @@ impl MainLoop<'_> {
                     let storage = self.settings.save(&image);
                     self.log.note_save(storage, self.settings.room());
                     arm.set_storage(storage);
-                    // The save took up to 5 ms, so read the clock again before the next poll.
+                    // The wait and the save may take more than 5 ms, so read the clock again before the next poll.
                     return now;
                 }
                 Output::Wait(until) => return until,
@@ -105,7 +105,7 @@ impl MainLoop<'_> {
                 self.log.note_bytes(now);
             }
             self.host.consume(taken);
-            // Less than a whole chunk: the queue is empty, or the controller takes no more.
+            // Less than a whole chunk: the queue is empty, or the controller takes no more, or the next pass takes the rest.
             if taken < CHUNK {
                 break;
             }

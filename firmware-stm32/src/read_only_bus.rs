@@ -44,8 +44,8 @@ impl ReadOnlyBus {
         answer.map(|answer| (answer, taken))
     }
 
-    /// Sends a question to an absent servo, and returns the received bytes as soon as they are as many as the question has, or
-    /// at the timeout. On a wire the echo is complete with the last byte sent.
+    /// Sends a question to an absent servo. Returns the received bytes once there are as many as in the frame of the question,
+    /// or at the timeout. On a wire the echo is complete with the last byte sent.
     pub(crate) fn echo(&mut self, question: &Question) -> ReceivedBytes {
         let mut echo = ReceivedBytes::new();
         self.listen(question, |received| {

@@ -8,9 +8,9 @@
 //!   DIR ────────▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔──────  from push until the last stop bit has left (TC)
 //! ```
 //!
-//! A byte with a receive error belongs to no frame (RM0090, section 30.3.3: it is delivered like any other). A mark takes its
-//! place in the queue, so that no frame is parsed across it. After an overrun a byte is missing: a mark takes its place as
-//! well. Tests: `serial_line/tests.rs`.
+//! The USART delivers a byte with a receive error like any other (RM0090, section 30.3.3), but the byte belongs to no frame. A
+//! mark takes its place in the queue, so that no frame is parsed across it. After an overrun a byte is missing: a mark takes its
+//! place as well. Tests: `serial_line/tests.rs`.
 
 use crate::byte_queue::ByteQueue;
 use crate::line_errors::LineErrors;
@@ -145,7 +145,7 @@ impl<U: UsartRegisters, D: BusDirection, const RECEIVE: usize, const TRANSMIT: u
     fn receive_error(&mut self, status: u16, byte: u8) {
         self.errors.count(status);
         if status & status::RECEIVED != 0 && status & status::DAMAGED == 0 {
-            // An overrun: this byte is good, the one behind it is lost.
+            // An overrun: this byte is good, and the next one is lost.
             self.received.push(byte);
         }
         // There is only one mark, so drop the bytes behind an older one. In a full queue the mark replaces the newest byte.

@@ -16,7 +16,7 @@ pub const fn base(start: u32) -> u32 {
     start & !(SIZE - 1) | VALID
 }
 
-/// MPU_RASR (B3.5.9): enabled, no access (AP = 0), no execution (XN). The region has 2^(SIZE + 1) bytes.
+/// MPU_RASR (B3.5.9): enabled, no access (AP = 0), no execution (XN). A value n of its size field means 2^(n + 1) bytes.
 #[must_use]
 pub const fn attributes() -> u32 {
     const NO_INSTRUCTIONS: u32 = 1 << 28;

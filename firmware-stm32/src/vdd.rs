@@ -5,8 +5,8 @@ const CALIBRATED_AT_MILLIVOLTS: u32 = 3_300;
 /// 3.3 V +/- 5 %.
 const GOOD_MILLIVOLTS: core::ops::RangeInclusive<u32> = 3_135..=3_465;
 
-/// The supply in millivolts, from the factory's reading of the internal reference and from the present one. `None` if
-/// one of them is out of range.
+/// The supply in millivolts, from the factory's reading of the internal reference and from the present one. `None` if the
+/// factory's reading is not in 1 to 4095, or if the present one is 0.
 #[must_use]
 pub fn millivolts(calibration: u16, reading: u16) -> Option<u32> {
     let is_calibrated = (1..4_096).contains(&calibration);

@@ -21,7 +21,7 @@ use crate::servo_bus::{Bus, Outcome};
 /// How long start-up lasts at most. A servo that has not answered by then counts as silent. Real servos need about
 /// 200 ms after power-up.
 const START_UP_TIME: Duration = Duration::from_millis(500);
-/// The torque switches are set again after this many control cycles, in case a frame was lost.
+/// The torque switches are set again after this many control cycles, because a frame that set them may have been lost.
 const TORQUE_REFRESH_CYCLES: u8 = 25;
 /// This many cycles before a refresh, the scheduler begins to read the torque switches that were not read since the
 /// last refresh: a switch is refreshed only if a read showed it on ([D28](protocol_core::decisions#d28)). The time is

@@ -2,6 +2,7 @@
 //!
 //! ```text
 //!   counts = a × k + s - offset × k        a = angle, or 180° - angle where the servo is mounted reversed
+//!                                          k = counts per degree, s = counts at a = 0
 //! ```
 //!
 //! The constants come from the maker's published firmware. As in that firmware, the offset

@@ -150,8 +150,8 @@ impl Controller {
         }
     }
 
-    /// When the next report is due, or silence on the line has an effect. Unless bytes come, the host cannot observe before
-    /// this time that `poll` is called late. A late shell still has to call `poll` for each deadline in between.
+    /// When the next report is due, or silence on the line has an effect. Unless bytes come, a late `poll` before this time
+    /// makes no difference to the host. A late shell still has to call `poll` for each deadline that it missed.
     #[must_use]
     pub fn host_deadline(&self) -> Instant {
         self.host.deadline()

@@ -296,7 +296,8 @@ impl JointState {
         self.alarms = 0;
     }
 
-    /// Enters or leaves motor state 1: forgets the obstacle, and that the joint was let go.
+    /// Lets the joint wait to engage, for motor state 1, or releases it, for the others. Forgets the obstacle, and that the joint
+    /// was let go.
     pub(crate) fn set_driven(&mut self, is_driven: bool) {
         self.obstacle.forget();
         self.let_go = LetGo::NO;

@@ -25,8 +25,8 @@ use crate::reach::Reached;
 use crate::servo_bus::{Answer, Question, Torque};
 use crate::supply_watch::SupplyWatch;
 
-/// A servo that restarts executes nothing for about 200 ms. So a servo that answered less than this ago has not
-/// restarted unnoticed.
+/// A servo that restarts executes nothing for about 200 ms. So if the last answer of a servo is not older than this time,
+/// the servo has not restarted unnoticed.
 const RESTART_TIME: Duration = Duration::from_millis(180);
 
 /// The seven joints and their motor state.
@@ -139,7 +139,8 @@ impl Joints {
         }
     }
 
-    /// Starts the moves to the positions in a write that was applied ([M7](protocol_core::decisions#m7)).
+    /// Starts the moves to the joint angles that reach the positions in a write that was applied
+    /// ([M7](protocol_core::decisions#m7)).
     pub(crate) fn reach(&mut self, reached: &Reached, registers: &mut RegisterFile) {
         for ((joint, state), target) in self.each_mut().zip(reached.targets) {
             if let Some(angle) = target {

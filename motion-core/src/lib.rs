@@ -1,4 +1,4 @@
-//! Motion control of a 7Bot V2 arm: executes the requests of a host with seven servos.
+//! Motion control of a 7Bot V2 arm: drives its seven servos as a host requests.
 //!
 //! ```text
 //!   host bytes ──▶ HostPort ──▶ ArmControl ──▶ Joints: Drive, Trajectory ──▶ calibration ──▶ Bus ──▶ servo bytes

@@ -11,7 +11,7 @@ use crate::calibration::MicroDegrees;
 use crate::limits::{claw_allows, linkage_allows};
 use crate::reach::Reached;
 
-/// The angle of each joint, a target or a set-point, that the limits are checked with; `None` for a joint without one.
+/// The targets or the set-points that are checked against the limits, one for each joint; `None` for a joint without one.
 pub(crate) type Angles = [Option<MicroDegrees>; JOINTS];
 
 /// A write that is to be checked.

@@ -36,7 +36,7 @@ pub fn linkage_step(before: [MicroDegrees; 2], after: [MicroDegrees; 2]) -> [Mic
     let mut excess = if sum > max { sum - max } else { (sum - min).min(0) };
     let mut limited = |before: MicroDegrees, after: MicroDegrees| {
         let step = after.0 - before.0;
-        // The part of the step that leaves the range. `clamp` contains a panic path.
+        // The part of the step that leaves the range. Without `clamp`, which contains a panic path.
         let outward = if excess > 0 { step.max(0).min(excess) } else { step.min(0).max(excess) };
         excess -= outward;
         MicroDegrees(after.0 - outward)

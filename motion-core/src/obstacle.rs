@@ -16,7 +16,7 @@ const BLOCKED_AFTER_CYCLES: u8 = 100;
 /// One count is 0.29 degrees for joints 5 to 7.
 const NEARER_BY: u32 = 300_000;
 
-/// A set-point that an obstacle holds back.
+/// The set-point of a joint that an obstacle holds back.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct HeldBack {
     pub(crate) set_point: MicroDegrees,
@@ -30,7 +30,7 @@ pub(crate) struct HeldBack {
 pub(crate) struct Obstacle {
     limiter: PushLimiter,
     /// For how many control cycles the joint has been held back without coming nearer to its target, and its distance
-    /// from the target when they began, in millionths of a degree. The time of a late call does not count: the joint
+    /// from the target when these cycles began, in millionths of a degree. The time of a late call does not count: the joint
     /// was neither measured nor driven meanwhile.
     held: Option<(u8, u32)>,
     is_blocked: bool,
@@ -89,7 +89,7 @@ impl Obstacle {
     }
 
     /// Checks the set-point of the control cycle that ends at `end`, of a joint measured at `angle`. If the set-point is
-    /// held back, returns the one that replaces it.
+    /// held back, returns the set-point that replaces it.
     pub(crate) fn hold_back(
         &mut self,
         end: Instant,

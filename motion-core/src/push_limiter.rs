@@ -53,14 +53,13 @@ const FULL_LOAD_DISTANCE: i32 = 4_300_000;
 pub(crate) const FULL_LOAD: i16 = 950;
 /// How far the push may exceed the limit while a joint sinks slowly ([D27](protocol_core::decisions#d27)).
 const TOLERANCE: i16 = 50;
-/// The largest speed at which a joint with a push up to the tolerance sinks: 10 degrees/s
-/// ([D27](protocol_core::decisions#d27)), in micro-degrees per millisecond. Goals are whole counts, so the bound itself
-/// moves at 8 degrees/s.
+/// The speed at which the bound retreats while the push is within the tolerance, in micro-degrees per millisecond. Goals are
+/// whole counts, so with 8 degrees/s the joint sinks at 10 degrees/s at most ([D27](protocol_core::decisions#d27)).
 const SINK_PER_MILLISECOND: i32 = 8_000;
 /// The distance may grow again when the push is this far under the limit; with a limit under twice this, when the push
 /// is under half the limit.
 const SLACK: i16 = 100;
-/// The growth of the distance after each average, in millionths of a degree.
+/// How much the distance grows after an average push that is low enough ([`SLACK`]), in millionths of a degree.
 const GROWTH: i32 = 100_000;
 /// Measurements in an average. The push follows a new goal after two measurements.
 const AVERAGED: i16 = 3;

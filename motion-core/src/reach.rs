@@ -140,7 +140,7 @@ mod tests {
         let ik6 = [105.124, 88.229, 109.746, 90.0, 135.254];
         assert_near(&solved(68, &WRIST).unwrap(), &[63.435, 90.382, 85.029]);
         assert_near(&solved(54, &[&TIP[..], &DOWN].concat()).unwrap(), &ik6);
-        // 128.006 in the maker's table is for (3, 4, 0).
+        // The maker's table has 128.006 degrees for joint 6 if the disc points to (3, 4, 0).
         let ik7 = solved(54, &[&TIP[..], &DOWN, &[131, 132, 128]].concat()).unwrap();
         assert_near(&ik7, &[&ik6[..], &[128.006]].concat());
     }

@@ -17,7 +17,7 @@ const CONFIRMED_BY: u8 = 2;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 enum Known {
-    /// The switch was ordered on, and not read as on since.
+    /// Torque was ordered, and no read has shown the switch on since.
     Ordered,
     /// The last read that is trusted showed the switch on.
     On,

@@ -106,7 +106,7 @@ impl Trajectory {
     }
 
     fn step(&mut self, distance: i32, most: i32) {
-        // `clamp` contains a panic path.
+        // Without `clamp`, which contains a panic path.
         self.set_point.0 += distance.min(most).max(-most);
     }
 
@@ -117,7 +117,8 @@ impl Trajectory {
     }
 
     /// Takes back the part of the last step beyond `set_point`, because the joint has to wait
-    /// ([D25](protocol_core::decisions#d25)). The time of a timed move does not pass meanwhile.
+    /// ([D25](protocol_core::decisions#d25)) or to give way ([D27](protocol_core::decisions#d27)). The time of a timed move does
+    /// not pass meanwhile.
     pub fn hold_back(&mut self, set_point: MicroDegrees) {
         self.set_point = set_point;
         if self.cycles_left > 0 {

@@ -40,7 +40,7 @@ impl ReportKind {
         }
     }
 
-    /// The address of the first register in the report, and how many there are.
+    /// The address of the first register in the report, and the number of registers.
     #[must_use]
     pub const fn registers(self) -> (u8, u8) {
         let row = match self {

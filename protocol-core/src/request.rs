@@ -124,7 +124,7 @@ impl<'a> Report<'a> {
 pub struct Alarm {
     /// 0: message. 1: warning. 2: fatal.
     pub level: u8,
-    /// 5: IK5 has no solution. 6: IK6. 7: IK7.
+    /// Which inverse kinematics has no solution: 5 is IK5, 6 is IK6, 7 is IK7.
     pub kind: u8,
 }
 

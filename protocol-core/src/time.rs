@@ -1,6 +1,6 @@
 //! Time as an argument.
 //!
-//! The cores read no clock. The shell passes the time with every call, so a test can simulate a year in a second and
+//! The cores read no clock. The shell passes the time with every call, so a test can simulate hours in seconds and
 //! repeat a run exactly. The shell defines the zero of time.
 
 use core::ops::{Add, Sub};
@@ -61,7 +61,7 @@ impl Duration {
     }
 }
 
-/// Rounds up to whole microseconds, so that a wait for the remaining time always ends.
+/// Rounds up to whole microseconds, so that a wait for this time is never too short.
 impl From<core::time::Duration> for Duration {
     fn from(time: core::time::Duration) -> Self {
         Self(time.as_nanos().div_ceil(1_000).try_into().unwrap_or(u64::MAX))

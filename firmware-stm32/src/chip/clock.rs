@@ -137,7 +137,7 @@ fn lock_pll(rcc: &pac::RCC, input_mhz: u8, from_crystal: bool) -> bool {
 /// Sets wait states and bus dividers for 168 MHz, then switches to the PLL. Returns false if the switch fails.
 fn switch_to_pll(rcc: &pac::RCC, flash: &pac::FLASH) -> bool {
     // Five wait states are enough above 2.7 V (RM0090, table 10). Prefetch stays off: it fails in the first revision of
-    // the chip (errata ES0182, section 2.1.12), and the caches replace most of it.
+    // the chip (errata ES0182, section 2.1.12), and the caches make up for most of its effect.
     flash.acr().write(|w| w.latency().ws5().icen().enabled().dcen().enabled());
     if !wait_for(READY_POLLS, || flash.acr().read().latency().is_ws5()) {
         return false;

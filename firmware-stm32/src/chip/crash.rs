@@ -28,7 +28,7 @@ static ENTERED: AtomicBool = AtomicBool::new(false);
 #[unsafe(link_section = ".uninit.RESET_CAUSE")]
 static RESET_CAUSE: AtomicU32 = AtomicU32::new(0);
 
-/// How often the frame is sent. A crash may interrupt a frame of goals: a servo that has received its length may wait
+/// How often the frame is sent. A crash may interrupt a frame of goals: a servo that has received the length byte may wait
 /// for 53 more bytes. If no pause ends this wait, the servo takes two frames of 22 bytes and a part of the third as
 /// those bytes, and parses the fourth. A servo that receives none of the four holds its goal.
 const REPEATS: usize = 4;

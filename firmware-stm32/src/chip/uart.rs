@@ -14,8 +14,8 @@
 //! queue. In the emulator the sender then waits. On a wire, an overrun occurs when the next byte is complete. Overruns
 //! and all other receive errors are counted.
 //!
-//! Both sides access the line in a critical section. The loop moves few bytes in each, so that each takes less than
-//! the 10 microseconds within which a byte of the servo bus has to be read, even on the internal oscillator.
+//! Both sides access the line in critical sections. The loop moves at most [`CHUNK`] bytes in a section, so that a section
+//! takes less than the 10 microseconds within which a byte of the servo bus has to be read, even on the internal oscillator.
 
 use core::cell::RefCell;
 use core::convert::Infallible;

@@ -13,7 +13,7 @@ use crate::CYCLE;
 
 /// The longest time that noise may delay a frame. A frame that damps the servos must not wait for noise to end.
 const MAX_NOISE_DELAY: Duration = Duration::from_millis(1);
-/// The registers of a goal: position, time and speed, two bytes each.
+/// The number of registers of a goal: position, time and speed have two each.
 const GOAL_REGISTERS: usize = 6;
 /// How many different read lengths there are.
 const READ_LENGTHS: u8 = 4;
@@ -40,7 +40,7 @@ pub struct HeldGoal {
     pub goal_counts: u16,
 }
 
-/// The registers of a read.
+/// Which registers a read asks for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Question {
@@ -166,7 +166,7 @@ impl Bus {
         self.answer_delay = delay;
     }
 
-    /// Takes bytes that were received by `now`. The guard time begins after them, whoever sent them.
+    /// Takes bytes that were received by `now`. The guard time begins after them, also after an echo or noise.
     pub fn bytes(&mut self, now: Instant, bytes: &[u8]) {
         self.decoder.push(bytes);
         if !bytes.is_empty() {
@@ -275,7 +275,7 @@ impl Bus {
         }
     }
 
-    /// The frame to send: the one that the last of the calls below encoded.
+    /// The frame to send, from the last call of [`Bus::ask`], [`Bus::set_torque`] or [`Bus::set_goals`].
     #[must_use]
     pub fn frame(&self) -> &[u8] {
         &self.frame

@@ -9,7 +9,8 @@ const FIRST: Joint = Joint::ALL[0];
 const SUPPLY_LOST: u8 = 198;
 const LET_GO: u8 = 196;
 
-/// An arm whose servos were all silent for three seconds. They receive every frame and hold, but all answers are damaged.
+/// An arm whose servos have all been silent for three seconds: they receive every frame and hold, but all their answers are
+/// damaged.
 fn silent_arm() -> Rig {
     let mut rig = Rig::started();
     for joint in Joint::ALL {
@@ -158,8 +159,8 @@ fn d29_the_torque_of_a_joint_that_is_let_go_is_read_after_a_silence_too() {
 
 #[test]
 fn d29_a_servo_that_answers_without_torque_has_supply_however_long_the_others_are_silent() {
-    // The servo takes 200 ms to start, and is asked ten times a second. In some of these moments it has answered, but does
-    // not hold yet.
+    // The servo takes 200 ms to start, and is asked ten times a second. At some of these times it has answered, but does not
+    // hold yet.
     for millis in 235..270 {
         let mut rig = Rig::started();
         for joint in Joint::ALL.into_iter().skip(1) {

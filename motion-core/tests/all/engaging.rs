@@ -10,7 +10,7 @@ const ELBOW: Joint = Joint::ALL[2];
 
 #[test]
 fn d12_a_goal_stays_where_the_joint_is_until_it_has_torque() {
-    // Servos that answer late, or not every time, put off the questions to the others, so that a control
+    // Servos that answer late, or not every time, delay the questions to the others, so that a control
     // cycle may come between a measurement and the torque.
     for phase in 0..100 {
         let mut rig = Rig::started();
@@ -37,7 +37,8 @@ fn d12_a_goal_stays_where_the_joint_is_until_it_has_torque() {
     }
 }
 
-/// An answer and the write may come in one turn of the shell. The answer is then processed first.
+/// An answer of a servo and a write of the host may come in the same turn of the shell's loop. The answer is then processed
+/// first.
 #[test]
 fn d13_an_answer_that_has_come_is_where_the_servo_state_is_entered() {
     let mut rig = Rig::started();
@@ -50,7 +51,7 @@ fn d13_an_answer_that_has_come_is_where_the_servo_state_is_entered() {
     }
     let answered_at = rig.plant.deadline().expect("an answer").as_micros();
     rig.run_us(answered_at - 1 - rig.now_us);
-    // The answer and the write in one turn of the shell.
+    // The answer and the write come in this turn.
     rig.now_us = answered_at;
     rig.write(29, &[1]);
     assert_eq!((rig.targets()[0], rig.present()[0]), (93, 93), "12 counts are 3.5 degrees");

@@ -43,7 +43,7 @@ fn refusal(rig: &mut Rig) -> (u8, u8) {
 #[test]
 fn d21_coarse_and_fine_targets_are_one_target() {
     let mut rig = Rig::started();
-    // Where the servos stood: joint 3 at 684 counts, joint 7 at 1008.
+    // The targets are the measured positions: joint 3 stood at 684 counts, joint 7 at 1008.
     assert_eq!(rig.read(FINE_TARGET, 14), fine(&[9_000, 9_000, 6_501, 9_000, 8_986, 8_986, 8_006]));
     rig.write(TARGET, &[100]);
     assert_eq!(word(&mut rig, FINE_TARGET), 10_000, "a coarse write has no fraction");
@@ -66,7 +66,7 @@ fn d21_positions_velocities_and_loads_are_those_of_the_servos() {
     assert_eq!(rig.read(FINE_POSITION, 14), [0xFF; 14]);
     rig.run_ms(1_000);
     assert_eq!((rig.get(MEASURED), word(&mut rig, FINE_POSITION + 6)), (0b111_0111, 0xFFFF));
-    // Joint 1 turns up and the reversed joint 3 down, both at 95 degrees/s.
+    // Joint 1 turns towards greater angles, joint 3, whose servo is reversed, towards smaller ones, both at 95 degrees/s.
     rig.write(32, &[50, 50, 50]);
     rig.write(TARGET, &[150, 90, 30]);
     rig.run_ms(300);
@@ -126,7 +126,7 @@ fn d23_a_fine_target_that_came_before_a_control_cycle_goes_out_with_its_goals() 
 fn d23_a_new_period_does_not_count_for_the_points_before_it_in_its_frame() {
     let mut rig = Rig::started();
     rig.write(32, &[0; 7]);
-    // 5 s.
+    // The move is to take 5 s.
     rig.write(39, &[50; 7]);
     let mut frame = fine(&[12_000, 9_000, 6_500, 9_000, 9_000, 9_000, 8_000]);
     frame.resize(56, 0);

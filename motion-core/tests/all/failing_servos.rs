@@ -1,4 +1,4 @@
-//! Servos that are missing, stuck or badly connected.
+//! Servos that are missing, stuck or badly connected, the echo of the bus, voltage and temperature, and the refresh of torque.
 
 use crate::rig::{Rig, ToServos};
 use arm_sim::servo::ServoFault;

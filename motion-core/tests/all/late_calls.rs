@@ -1,4 +1,4 @@
-//! Late answers of the servos, as behind a USB adapter, and a controller that is called late.
+//! Late answers of the servos, as behind a USB adapter, positions that jump, and a controller that is called late.
 
 use crate::rig::{Rig, STANDARD_POSE};
 use arm_sim::plant::Wall;
@@ -53,15 +53,15 @@ fn engaged_joints_stay_engaged_after_a_late_call() {
 #[test]
 fn d29_after_a_late_call_a_servo_that_restarted_meanwhile_gets_no_old_goal() {
     let joint = Joint::ALL[0];
-    // In some of these moments the controller has not processed an answer from before the restart.
+    // At some of these times the controller has not processed an answer from before the restart.
     for micros in (0..10_000).step_by(250) {
         let moved = moved_after_a_restart(joint, micros);
         assert!(moved < 1_000, "after {micros} us it moved by {moved} without an order");
     }
 }
 
-/// How far a joint moves after a late call, if its servo restarted since the call before. In thousandths of a degree. The
-/// restart is 100 ms and `micros` after the start of a move.
+/// How far a joint moves after a late call if its servo restarted since the previous call, in thousandths of a degree. The
+/// restart is 100 ms and `micros` microseconds after the start of a move.
 fn moved_after_a_restart(joint: Joint, micros: u64) -> i32 {
     let mut rig = Rig::started();
     rig.plant.set_goal_starts_torque(true);

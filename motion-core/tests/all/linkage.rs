@@ -1,4 +1,4 @@
-//! The linkage of joints 2 and 3 on the way (D25): set-points never break it, and they always arrive.
+//! The linkage of joints 2 and 3 during moves (D25): set-points never break it, and they always reach their targets.
 
 use motion_core::calibration::MicroDegrees;
 use motion_core::limits::{linkage_allows, linkage_step};
@@ -17,8 +17,8 @@ fn legal_pairs(step: usize) -> Vec<Pair> {
     angles().flat_map(|two| angles().map(move |three| [two, three])).filter(|pair| is_legal(*pair)).collect()
 }
 
-/// Moves from one legal pair to another, as the controller does, and panics if a set-point breaks the linkage or does not
-/// arrive in the time of both moves one after the other.
+/// Moves from one legal pair to another, as the controller does. Panics if a set-point breaks the linkage, or does not arrive
+/// within the sum of the times of the two moves.
 fn travel(from: Pair, to: Pair, speeds: Pair, times: Pair) {
     let mut moves = from.map(|angle| Trajectory::holding(MicroDegrees::from_degrees(angle)));
     for (trajectory, (to, time)) in moves.iter_mut().zip(to.into_iter().zip(times)) {

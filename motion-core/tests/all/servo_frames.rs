@@ -1,6 +1,6 @@
 //! The frames of the servo bus: golden bytes in both directions, streams cut anywhere, noise, and damaged bytes.
 //!
-//! Golden frames are added to, not edited.
+//! Add golden frames; never edit one.
 
 use motion_core::servo_bus::frame::{
     Decoder, Instruction, MAX_FRAME, Reading, ServoFrame, ServoFrameBuffer, WrongChecksum, error, ping, read,
@@ -99,7 +99,7 @@ fn a_sync_write_to_all_seven_joints_takes_57_bytes() {
 
 #[test]
 fn golden_status() {
-    // Id 2 at 511 counts, 300 steps/s backwards, load 4.5 % forwards, 7.4 V, 31 degrees; overloaded.
+    // Id 2 at 511 counts, 300 counts/s backwards, load 4.5 % forwards, 7.4 V, 31 degrees Celsius; overloaded.
     let bytes = [0xFF, 0xFF, 2, 0x0A, 0x20, 0x01, 0xFF, 0x81, 0x2C, 0x00, 0x2D, 0x4A, 0x1F, 0x90];
     let reading = Reading {
         position_counts: 511,
@@ -255,8 +255,8 @@ proptest! {
     }
 }
 
-/// Two frames with damage at two places. A frame that damage splits is lost, and so is a frame between the two places unless
-/// the bytes before it were pulled in between.
+/// Two frames with damage at two places. A frame that damage splits is lost. So is a frame between the two places, unless the
+/// decoder was pulled before the second damage.
 #[test]
 fn no_frame_continues_across_damage() {
     let stream = [encoded(|buffer| ping(buffer, 1)), encoded(|buffer| ping(buffer, 2))].concat();

@@ -1,4 +1,5 @@
-//! Streams at their bounds: frames exactly late enough, a joint exactly fast enough, a joint that is too slow (D23).
+//! Streams at their limits: the latest frames that continue a stream or follow no lost frame, a joint that is just fast
+//! enough, and a joint that is too slow (D23).
 
 use motion_core::calibration::MicroDegrees;
 use motion_core::point_stream::PointStream;

@@ -1,6 +1,6 @@
 //! Streams of points whose frames come early, late, too fast, or not at all (D23).
 
-#![allow(clippy::cast_precision_loss)] // In tests.
+#![allow(clippy::cast_precision_loss)] // The numbers are far below 2^53, so `f64` holds them exactly.
 
 use motion_core::CYCLE;
 use motion_core::calibration::MicroDegrees;
@@ -50,7 +50,7 @@ fn ramp(times: &[u64], step: i32) -> Vec<Arrival> {
     times.iter().zip(1..).map(|(&at, k)| (at, k * step)).collect()
 }
 
-/// Micro-degrees per point at 100 degrees/s, or less where 60 points would leave the range.
+/// Micro-degrees per point at 100 degrees/s, or less where 60 points would go beyond 180 degrees.
 fn step_for(period_us: u64) -> i32 {
     i32::try_from((100 * period_us).min(2_900_000)).unwrap()
 }
@@ -64,7 +64,7 @@ proptest! {
         let arrivals = ramp(&times, step);
         let out = set_points(0, &arrivals, period, FASTEST, phase);
         let expected = f64::from(step) * CYCLE_US as f64 / period as f64;
-        // Without the start from rest before the first points, and the stop at the last point.
+        // Leave out the start from rest before the first points, and the stop at the last point.
         let (first, last) = (2 * step, arrivals.last().unwrap().1 - 2 * step);
         for pair in out.windows(2).filter(|pair| pair[0].1 >= first && pair[1].1 <= last) {
             let velocity = f64::from(pair[1].1 - pair[0].1) / expected;
@@ -105,7 +105,7 @@ proptest! {
     }
 }
 
-/// The time from which on the set-point stays at its end.
+/// The time at which the set-point reaches its final value for good.
 fn settled(out: &[(u64, i32)]) -> u64 {
     let (_, end) = *out.last().unwrap();
     out.iter().rev().take_while(|(_, set_point)| *set_point == end).last().unwrap().0

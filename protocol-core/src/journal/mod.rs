@@ -20,8 +20,8 @@
 //! the next generation. The next start erases the old home, which becomes the spare. The rules:
 //!
 //! - **Only a start erases.** An erase stops the chip for up to 0.8 s, which is not allowed while the servos are on. A
-//!   start that finds less than a quarter of home free moves to the spare at once. So each power cycle has room for a
-//!   quarter and a whole sector at least: over 600 saves with 16 KiB sectors.
+//!   start that finds less than a quarter of home free moves to the spare at once. So each power cycle has room for
+//!   about 1.25 sectors of records or more: over 600 saves with 16 KiB sectors.
 //! - **A power cut leaves half-programmed cells.** They may read differently at each start. The seal is programmed after
 //!   the other words were verified, so a sealed record was complete. A record is in doubt if it is unsealed, needed a
 //!   correction, or has remains of another record behind it. A start appends such a record again before it erases
@@ -33,12 +33,13 @@
 //!   prepared for, so an older mark that survives an interrupted erase is not valid. One word is enough: the sector is
 //!   blank before the first bit of the mark is programmed. An interrupted mark lacks zeros, and an erase adds none.
 //!   Such a mark costs one more erase, and it cannot become valid if that erase is interrupted, too.
-//! - **A valid mark is revoked before its sector is erased.** Otherwise it might survive an interrupted erase. This
-//!   happens if many starts in a row are interrupted during the move to the spare, until the spare is half full of
-//!   remains. A word behind home's own mark then moves the spare to the next generation.
-//! - **A start skips one slot**, because a word that was cut at its very beginning may read as blank. If the first record
-//!   of a power cycle is cut like that, the next power cycle uses the same slot. It programs the same first word again,
-//!   because a record begins with the generation of its sector.
+//! - **A valid mark is revoked before its sector is erased.** Otherwise it might survive an interrupted erase. A start
+//!   erases a sector with a valid mark only after many starts in a row were interrupted during the move to the spare, so
+//!   that the spare is half full of remains. The revocation is a word behind home's own mark: it assigns the next
+//!   generation to the spare.
+//! - **A start skips one slot**, because a word whose programming was cut at its very beginning may read as blank. If the
+//!   first record of a power cycle is cut like that, the next power cycle uses the same slot. It programs the same first
+//!   word again, because a record begins with the generation of its sector.
 //! - **The last four slots of a sector are reserved for starts**, so that a start can append a record when saves find no
 //!   room.
 //! - **A log always has a record.** The first start appends a record without settings. Otherwise an interrupted first

@@ -11,8 +11,8 @@ pub enum Range {
     /// ([D9](crate::decisions#d9)).
     SignMagnitude(u8),
     /// A number whose magnitude is at most this one, in any of three encodings: 128 more than the number, the number itself,
-    /// or 256 more than a negative number ([M5](crate::decisions#m5)). The encodings do not overlap, because the
-    /// largest magnitude is at most 56.
+    /// or 256 more than a negative number ([M5](crate::decisions#m5)). The magnitude has to be at most 63: then the
+    /// encodings do not overlap.
     Biased(u8),
     /// Two bytes: every number up to and including this one.
     WordUpTo(u16),

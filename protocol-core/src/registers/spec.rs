@@ -160,7 +160,7 @@ impl Register {
         self
     }
 
-    /// Sets the name and the doc comment. The macro of the table calls it.
+    /// Sets the name and the doc comment. The macros of the two tables call it.
     pub(crate) const fn described(mut self, name: &'static str, doc: &'static [&'static str]) -> Self {
         self.name = name;
         self.doc = doc;

@@ -109,12 +109,12 @@ impl<D: Direction> Deframer<D> {
         }
     }
 
-    /// The next frame or defect; `None` once the bytes so far hold no more. Call it until then.
+    /// The next frame or defect; `None` if the bytes so far hold no more. Call it until it returns `None`.
     pub fn pull(&mut self) -> Option<Result<Frame<'_>, Defect>> {
         self.search.next::<D>(&self.buffer)
     }
 
-    /// When continued silence would have an effect. The shell has to check the line by then. `None` if silence has no
+    /// When continued silence has an effect. The shell has to check the line at that time. `None` if silence has no
     /// effect.
     #[must_use]
     pub fn deadline(&self) -> Option<Instant> {

@@ -15,7 +15,7 @@ pub const PREFIX_LENGTH: usize = 5;
 pub const CRC_LENGTH: usize = 2;
 /// The shortest frame: one without data.
 pub const MIN_LENGTH: usize = PREFIX_LENGTH + CRC_LENGTH;
-/// The longest frame: 255 bytes of data in their envelope ([D1](crate::decisions#d1)).
+/// The longest frame: 255 bytes of data with prefix and CRC ([D1](crate::decisions#d1)).
 pub const MAX_LENGTH: usize = PREFIX_LENGTH + 255 + CRC_LENGTH;
 
 /// An encoded frame.
@@ -184,7 +184,7 @@ fn body<'a, D: Direction>(
 
 /// Parses the frame at the beginning of `input`, which goes in direction `D`.
 ///
-/// On the host, inlining saves a third of the time. On the chip it spills registers and costs flash.
+/// On the host, inlining saves a third of the parse time. On the chip it spills CPU registers and costs flash.
 #[cfg_attr(target_os = "none", inline(never))]
 #[cfg_attr(not(target_os = "none"), inline(always))]
 #[must_use]
@@ -211,8 +211,8 @@ pub fn encode(buffer: &mut FrameBuffer, function: Function, address: u8, count: 
     // The buffer holds the longest frame, so nothing here can fail.
     let _ = buffer.extend_from_slice(&[HEADER[0], HEADER[1], function as u8, address]);
     let _ = buffer.push(count);
-    // Copy and compute the CRC in one pass: a separate call to copy takes longer. A loop, because a fold that starts with the CRC
-    // of the prefix computes the place of each word twice.
+    // Copy and compute the CRC in one pass: a separate call to copy takes longer. This is a loop, because in a fold that starts
+    // with the CRC of the prefix, the compiler computes the address of each word twice.
     let mut crc = crc_of_prefix((function, address, count));
     for word in words {
         let _ = buffer.extend_from_slice(word);

@@ -10,7 +10,7 @@
 //!
 //! The deframer appends no bytes while the search has not passed a timeout, so such a timeout is at the end of the bytes.
 //!
-//! This file handles positions only. The deframer owns the bytes and appends to them while the search goes on.
+//! This file handles positions only. The deframer owns the bytes, and appends to them between two calls of the search.
 
 use super::frame::{Defect, Direction, Frame, HEADER, MIN_LENGTH, ParseOutcome, parse};
 

@@ -1,10 +1,10 @@
-//! A million good frames for each kind of disturbance: how many are lost, and how late the rest come (D3, D4).
+//! A million good frames for each kind of disturbance: how many are lost, and how late the others are (D3 to D5).
 
 use crate::disturbed_line::{Disturbance, run};
 use crate::stream::GAP_US;
 
 const FRAMES: usize = 1_000_000;
-/// At most five in a million are lost: where noise happens to form a frame with a correct checksum.
+/// At most five frames in a million are lost: where disturbed bytes happen to form a frame with a correct checksum.
 const MOST_LOST: usize = 5;
 
 fn check(disturbance: Disturbance, most_lost: usize) {

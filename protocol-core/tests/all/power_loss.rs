@@ -1,7 +1,7 @@
-//! D19: the power is cut at every program and every erase, in every way that a cell can be left, once and then again
-//! before the first cut is repaired. The settings found are those before or after a save, and never others.
+//! D19: the power is cut at each program and each erase operation, in every way that the flash model has, and cut again
+//! before a start has repaired the damage of the first cut. A start finds the settings before or after a save, never others.
 //!
-//! With `JOURNAL_LONG=1` the tests try much more. `JOURNAL_SEED=n` is another seed for the random cuts. The test of three
+//! With `JOURNAL_LONG=1` the tests try much more. `JOURNAL_SEED=n` sets the seed of the random cuts. The test of three
 //! cuts in a row is ignored by default. How much was tried is printed (`--nocapture`).
 
 use crate::journal_world::{End, REAL, World, cuts, every_cut, image, report};
@@ -67,7 +67,7 @@ fn cut_everything_once_in<const SECTOR: usize>(
 #[test]
 fn a_cut_at_every_step_of_a_thousand_updates_of_the_real_flash() {
     let cycles = (0..6 * 44).map(|cycle| [3, 1, 11, 0, 6, 2][cycle % 6]);
-    // Then cycles that fill the flash: into the spare, and to its end.
+    // The last cycles fill home and continue in the spare, some of them up to its end.
     cut_everything_once::<REAL>(cycles.chain([380, 2, 380, 640, 1, 900, 1200, 3]));
 }
 
@@ -134,7 +134,7 @@ fn a_second_cut_at_every_step_before_the_first_is_mended() {
 #[test]
 #[ignore = "takes minutes"]
 fn a_third_cut_at_every_step_before_the_others_are_mended() {
-    // First only starts after the first cut, then starts with a save each.
+    // After the first cut, the cycles of the first call have no saves, and those of the second call have one each.
     cut_everything_again::<512>([0, 1, 13], 0, 3);
     cut_everything_again::<512>([1], 1, 3);
 }

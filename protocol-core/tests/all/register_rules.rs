@@ -1,5 +1,6 @@
-//! Reads and writes against the table (D1, D2, D15 to D17, D22): every range of addresses, for writes with each lock and
-//! motor state and with some values for all its bytes, and every value of each single register.
+//! Reads and writes against the table (D1, D2, D15 to D17, D22). The reads cover every range of addresses. So do the writes,
+//! in each lock and motor state, with all bytes of a write equal to one of some values. Other writes cover every value of
+//! each single register.
 
 use protocol_core::registers::map::{baud_rate, fault, find};
 use protocol_core::registers::map21::find_readable;

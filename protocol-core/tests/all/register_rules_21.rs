@@ -1,5 +1,5 @@
-//! Writes in map 2.1 against the text of the protocol (M2, M3, M5, M6): every range of addresses with each lock state and with
-//! some values for all its bytes, and every value of each single register.
+//! Writes in map 2.1 against the text of the protocol (M2, M3, M5, M6). The writes cover every range of addresses in each lock
+//! state, with all bytes of a write equal to one of some values. Other writes cover every value of each single register.
 
 use protocol_core::registers::map::LAST_REFUSAL;
 use protocol_core::registers::map21::find_readable;
@@ -51,7 +51,7 @@ fn expected(before: &[u8; 256], address: u8, values: &[u8]) -> Result<[u8; 256],
             if !is_in_range(at, value) {
                 return Err(at);
             }
-            // A read of these gives the present positions.
+            // A read of 54 to 60 gives the present positions.
             if !(54..=60).contains(&at) {
                 after[usize::from(at)] = shown(at, value);
             }

@@ -36,7 +36,7 @@ impl Decoder {
         Self { buffer: heapless::Vec::new(), head: 0, damaged_at: 0 }
     }
 
-    /// Takes received bytes. Beyond [`Decoder::CAPACITY`] the oldest bytes are lost, so pull in between.
+    /// Takes received bytes. Beyond [`Decoder::CAPACITY`] the oldest bytes are lost, so pull between two calls.
     pub fn push(&mut self, bytes: &[u8]) {
         let newest = bytes.get(bytes.len().saturating_sub(Self::CAPACITY)..).unwrap_or(bytes);
         let excess = (self.buffer.len() + newest.len()).saturating_sub(Self::CAPACITY);
@@ -56,8 +56,8 @@ impl Decoder {
         self.damaged_at = self.buffer.len();
     }
 
-    /// The next frame or wrong checksum; `None` once more bytes are needed. Call it until then. After a wrong checksum
-    /// the search continues with the next byte, so a damaged frame does not cost the next one.
+    /// The next frame or wrong checksum; `None` if more bytes are needed. Call it until it returns `None`. After a wrong
+    /// checksum the search continues with the next byte, so the frame behind a damaged one is found.
     pub fn pull(&mut self) -> Option<Result<ServoFrame<'_>, WrongChecksum>> {
         loop {
             let is_before_damage = self.head < self.damaged_at;

@@ -1,4 +1,4 @@
-//! The register addresses of a servo. Two bytes are a 16-bit value, high byte first. Registers below 40 are EEPROM.
+//! The register addresses of a servo. A value of two bytes has its high byte first. Registers below 40 are EEPROM.
 
 /// Version of the servo's firmware: major, minor. Undefined in Feetech's older tables.
 pub const FIRMWARE_VERSION: u8 = 0;
@@ -38,7 +38,7 @@ pub const GOAL_TIME: u8 = 44;
 pub const GOAL_SPEED: u8 = 46;
 /// Lock of the servo's own EEPROM: 0 is open, 1 is locked.
 pub const LOCK: u8 = 48;
-/// The measured position, in counts; two bytes, and the first of the eight of a `Reading`.
+/// The measured position, in counts; two bytes. The eight bytes of a `Reading` begin here.
 pub const PRESENT_POSITION: u8 = 56;
 /// The measured speed; two bytes, bit 15 is the sign.
 pub const PRESENT_SPEED: u8 = 58;

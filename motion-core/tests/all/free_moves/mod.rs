@@ -16,7 +16,7 @@ pub struct FreeMoves {
 }
 
 impl FreeMoves {
-    /// The moves of a seed, with register 192 as given.
+    /// The moves of a seed. `protection` is the value of register 192.
     pub fn of(seed: u64, protection: u8) -> Self {
         let mut numbers = Numbers(seed);
         let mut moves = Self { grams: 0, steps: Vec::new() };

@@ -7,7 +7,7 @@ use protocol_core::time::Instant;
 
 use super::{ALARMS, LET_GO, bit, joint};
 
-/// An arm that carries 100 g. The servo of joint 3 has tripped. Also returns the angle of joint 3 before, in millidegrees.
+/// An arm that carries 100 g. The servo of joint 3 has tripped. Also returns the angle of joint 3 before that, in millidegrees.
 fn tripped(trip: Trip) -> (Rig, i32) {
     let mut rig = Rig::started();
     rig.plant.set_load(100);
@@ -93,7 +93,7 @@ fn d28_without_protection_nothing_engages_by_itself() {
 
 #[test]
 fn d28_a_latched_overload_gets_torque_off_before_torque() {
-    // Both orders come while the joint rests without torque: it may engage at the next answer.
+    // Each write comes while the joint rests without torque: the joint may engage at the next answer.
     for (register, value) in [(192, 1), (29, 1)] {
         for delay_us in (0..5_000).step_by(250) {
             let mut rig = Rig::started();

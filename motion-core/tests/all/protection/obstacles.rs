@@ -13,8 +13,8 @@ fn put(rig: &mut Rig, number: u8, degrees: u8) {
     rig.hand(number, counts_from_angle(joint(number), MicroDegrees::from_degrees(degrees), 0));
 }
 
-/// The largest average push of a joint over 100 ms in 0.1 %, while `millis` pass. The joint must not turn: its load
-/// counts as its push.
+/// The largest average push of a joint over 100 ms in 0.1 %, while `millis` pass. The joint must not turn, because its
+/// load counts as its push.
 fn largest_average_load(rig: &mut Rig, joint: Joint, millis: usize) -> i32 {
     let mut loads = Vec::new();
     let mut largest = 0;

@@ -134,7 +134,7 @@ impl Rig {
         }
     }
 
-    /// One turn of the shell's loop. Returns when the next is due, in microseconds.
+    /// Runs one turn of the shell's loop. Returns when the next turn is due, in microseconds.
     fn turn(&mut self) -> u64 {
         let now = self.now();
         self.controller.host_bytes(now, &[]);
@@ -170,7 +170,7 @@ impl Rig {
         }
     }
 
-    /// Does a frame reach the servos? Records what it does to them.
+    /// Does a frame reach the servos? If it does, records its goals, and each servo that it gives torque.
     fn arrives(&mut self, told: &ToServos) -> bool {
         match told {
             ToServos::Goals(goals) => {

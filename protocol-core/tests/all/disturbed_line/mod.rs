@@ -1,5 +1,5 @@
-//! Good frames on a line that is disturbed in one of eight ways: how many are lost, and how late the rest come
-//! (D3, D4).
+//! Good frames on a line that is disturbed in one of seven ways, or not disturbed but always busy: how many frames are
+//! lost, and how late the others are (D3, D4).
 //!
 //! The line runs at 115 200 baud. A disturbance is followed by a burst of good frames, then silence. The delay of a
 //! frame is the time from its last byte until the deframer returns it, less the duration of its burst.
@@ -130,7 +130,7 @@ struct Line {
     waiting: Vec<Vec<u8>>,
     /// How many frames of the burst came out or were lost.
     done: usize,
-    /// When the last byte of each frame of the burst was through.
+    /// When the last byte of each frame of the burst had arrived.
     ends: Vec<u64>,
     burst_us: u64,
     tally: Tally,

@@ -1,8 +1,8 @@
 //! An arm's settings over many power cycles, and what must hold in every one of them (D19):
 //!
-//! - a start finds what was last acknowledged, or something that was attempted since;
+//! - a start finds the image of the last acknowledged save, or of a save attempted since;
 //! - all later starts find the same, until another save is acknowledged or attempted;
-//! - a save is refused only where no room was promised;
+//! - a save is refused only if [`Journal::room`] was 0;
 //! - only a start erases: it erases two sectors and programs 18 words at most; a save programs eight.
 #![allow(dead_code)] // Each test program uses its part.
 
@@ -71,7 +71,7 @@ pub enum End {
 #[derive(Clone, Debug)]
 pub struct World<const SECTOR: usize> {
     pub flash: RefCell<Flash<SECTOR>>,
-    /// What the next start may find.
+    /// The settings that the next start may find.
     possible: Vec<Option<Image>>,
     /// How many saves were tried: the number of the last image.
     pub images: u64,
@@ -79,7 +79,7 @@ pub struct World<const SECTOR: usize> {
     pub seed: u64,
     /// The largest number of erased sectors and of programmed words in one start.
     pub most: (usize, usize),
-    /// The power cycles so far, for the report of a failure.
+    /// The power cycles since the last [`World::forget_past`] that cleared them, for the report of a failure.
     past: Vec<(usize, Option<Cut>)>,
 }
 
@@ -113,7 +113,7 @@ impl<const SECTOR: usize> World<SECTOR> {
         Self { flash, possible, images: 0, seed: 0, most: (0, 0), past: Vec::new() }
     }
 
-    /// What the next start finds. Panics if there are several possibilities.
+    /// The settings that the next start finds. Panics if there are several possibilities.
     #[must_use]
     pub fn settings(&self) -> Option<Image> {
         assert_eq!(self.possible.len(), 1);
@@ -238,7 +238,8 @@ pub fn every_cut<const SECTOR: usize>(
     })
 }
 
-/// Prints what was tried, as a row of the table that `cargo xtask torture` prints. A failure has panicked before.
+/// Prints what was tried, as a row of the table that `cargo xtask torture` prints. The last column, the failures, is always
+/// `nothing`: a failure panics before this call.
 pub fn report(tried: &str, many: &str) {
     println!("\njournal, {tried}\t{many}\tnothing");
 }
