@@ -20,7 +20,7 @@ pub enum Finish {
     Accent,
 }
 
-/// Triangles, three corners each. The vectors have the same length.
+/// Triangles, three corners each. The three lists have one entry for each corner.
 #[derive(Clone, Debug, Default)]
 pub struct Mesh {
     /// Position of each corner, in mm.

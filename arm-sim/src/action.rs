@@ -37,7 +37,8 @@ pub enum Action {
     LetGo(Joint),
     /// `weight 150`: grams in the gripper.
     Weight(u16),
-    /// `drop`: the tool drops everything. The thing between the claws and the weight disappear; an object of the scene falls.
+    /// `drop`: the tool drops everything. The weight disappears, and so does a thing between the claws. An object of the scene
+    /// falls.
     Drop,
     /// `trip 2` latches an overload of a joint's servo; `trip 2 heat` makes the servo too hot.
     Trip(Joint, Trip),

@@ -12,7 +12,7 @@ pub trait ArmController: Clone + Debug {
     /// A controller that is powered up at `now`, with the settings found in the storage.
     fn power_up(now: Instant, config: Config, stored: Option<&Image>, storage: Storage) -> Self;
 
-    /// Sets the longest delay of a servo's answer between the wire and the controller, as in the buffer of a USB adapter.
+    /// Sets the longest delay of a servo's answer between the wire and the controller, such as the delay of a USB adapter.
     fn set_answer_delay(&mut self, delay: Duration);
 
     /// Takes bytes from the host, and returns how many it took. An empty slice states that the host's line is silent.
@@ -24,7 +24,7 @@ pub trait ArmController: Clone + Debug {
     /// The next action. Call it until it returns [`Output::Wait`].
     fn poll(&mut self, now: Instant, host_room: usize) -> Output<'_>;
 
-    /// The time until which the host does not notice a delayed poll, unless bytes arrive earlier.
+    /// A poll can be delayed until this time without a difference for the host, unless bytes arrive earlier.
     fn host_deadline(&self) -> Instant;
 
     /// Sets the state of the storage, after an [`Output::Save`].

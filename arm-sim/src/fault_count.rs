@@ -16,7 +16,7 @@ impl FaultCount {
         self.count_many(1, has_effect);
     }
 
-    /// Counts several occasions of the same kind.
+    /// Counts several occasions. With `has_effect`, the fault took effect in each of them, otherwise in none.
     pub(crate) const fn count_many(&mut self, occasions: u64, has_effect: bool) {
         self.occasions = self.occasions.saturating_add(occasions);
         if has_effect {

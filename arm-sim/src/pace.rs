@@ -16,8 +16,8 @@ use protocol_core::wire::MAX_LENGTH;
 pub const CAPACITY: usize = 2 * MAX_LENGTH;
 /// Start bit, eight data bits, stop bit.
 const BITS_PER_BYTE: u64 = 10;
-/// [`Pacer::deadline`] is the time when the bytes of this many microseconds have arrived. A wake-up for each byte would cost
-/// more time than the byte, and serial adapters do not deliver single bytes either.
+/// [`Pacer::deadline`] waits for a batch: as many bytes as the line carries in this time, in microseconds. A wake-up for each
+/// byte would take more time than the byte, and serial adapters do not deliver single bytes either.
 const BATCH_MICROS: u64 = 1_000;
 
 /// One direction of a serial line.
@@ -33,7 +33,7 @@ pub struct Pacer {
     busy_since: Instant,
     /// Number of bytes that have arrived since `busy_since`.
     sent: u64,
-    /// The deadline is the time when the bytes of this many microseconds have arrived. 0: the next byte.
+    /// The length of a batch of bytes for [`Pacer::deadline`], in microseconds. 0: a batch is one byte.
     batch_micros: u64,
 }
 

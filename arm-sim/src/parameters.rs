@@ -27,8 +27,8 @@
 //! | which of them switch the motor off | all three | register 19, Feetech's factory setting 37 (0x25) |
 //! | brown-out: the servo restarts | below 4.5 V | assumed |
 //! | temperature around the arm | 25 °C | assumed |
-//! | final rise at 100 % torque | 200 K, by the square of the torque | assumed: 40 % rises by 32 K |
-//! | time constant of the temperature | 300 s | assumed: 100 % reaches 80 °C after 99 s |
+//! | final rise at 100 % torque | 200 K, by the square of the torque | assumed: 40 % torque gives a rise of 32 K |
+//! | time constant of the temperature | 300 s | assumed: at 100 % torque, a servo shows more than 80 °C after 99 s |
 //!
 //! | arm | value | source |
 //! | --- | --- | --- |

@@ -202,8 +202,8 @@ impl Plant {
         self.wire.take(now)
     }
 
-    /// When the last byte of the next answer arrives; `None` if there is no answer. The motors need no calls: the next
-    /// call simulates the time between.
+    /// When the last byte of the next answer arrives; `None` if there is no answer. The motors need no calls at certain times:
+    /// each call simulates the time since the call before.
     #[must_use]
     pub fn deadline(&self) -> Option<Instant> {
         self.wire.deadline()
@@ -286,7 +286,7 @@ impl Plant {
         self.servo(joint).map_or(0, Servo::goal_counts)
     }
 
-    /// The torque of a joint's motor in 0.1 % of its stall torque: its load less the part that its speed needs. Positive
+    /// The torque of a joint's motor in 0.1 % of the stall torque: the load less the part that the speed needs. Positive
     /// values are towards more counts.
     #[must_use]
     pub fn motor_torque(&self, joint: Joint) -> i16 {

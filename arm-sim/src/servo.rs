@@ -110,7 +110,8 @@ impl Servo {
         }
     }
 
-    /// Switches power off and on. Position, temperature, fault, EEPROM and the hand stay; everything else is lost.
+    /// Switches power off and on. Torque, goal, all RAM registers and a latched overload are lost. [`ServoFault::Garbled`] counts
+    /// the answers from the start again.
     pub fn power_cycle(&mut self, ready_at: Instant) {
         self.registers.power_cycle();
         self.ready_at = ready_at;

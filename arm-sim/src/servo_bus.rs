@@ -6,7 +6,7 @@ use crate::plant::Plant;
 
 /// A servo bus from the side of the controller.
 pub trait ServoBus {
-    /// Do the servos run in real time? Then a late caller cannot catch up.
+    /// Do the servos run in real time? If so, a late caller cannot catch up.
     const IS_REAL: bool;
 
     /// The baud rate, in bits per second.

@@ -6,8 +6,9 @@
 //!   host_received ◀─ Pacer ◀─ └────────────┘ ──▶ Settings
 //! ```
 //!
-//! The simulation advances from event to event, and processes each event at its own time. So the result does not depend on
-//! how often [`SimulatedArm::advance`] is called: a late call slows down neither the arm nor its servos.
+//! With simulated servos, the simulation advances from event to event, and processes each event at its own time. So the result
+//! does not depend on how often [`SimulatedArm::advance`] is called: a late call slows down neither the arm nor its servos. With
+//! real servos, each call processes the present time only.
 
 use alloc::boxed::Box;
 

@@ -238,7 +238,8 @@ impl<C: ArmController> Simulation<C> {
         self.arm.power_cycle(self.now);
     }
 
-    /// Restarts the controller, as its watchdog does. The servos keep power, torque and goals.
+    /// Restarts the controller, as its watchdog does. RAM and the bytes on the host line are lost. The servos keep power, torque
+    /// and goals.
     pub fn restart_controller(&mut self) {
         self.to_send.clear();
         self.arm.restart_controller(self.now);
@@ -256,7 +257,7 @@ impl<C: ArmController> Simulation<C> {
         self.arm.host_disconnect();
     }
 
-    /// Switches the arm off, until [`Simulation::power_cycle`]. Loaded joints fall.
+    /// Switches the arm off, until [`Simulation::power_cycle`]. RAM and the bytes on the host line are lost. Loaded joints fall.
     pub fn power_off(&mut self) {
         self.to_send.clear();
         self.arm.power_off(self.now);
@@ -294,7 +295,8 @@ impl<C: ArmController> Simulation<C> {
         self.arm.take_ended_faults()
     }
 
-    /// Sets the seed of the random faults of the host line, 1 by default. The bytes on the host line are lost.
+    /// Sets the seed of the random faults of the host line, 1 by default. The bytes on the host line are lost, and the counts of
+    /// its faults begin again at 0.
     pub fn set_seed(&mut self, seed: u64) {
         self.arm.set_seed(seed);
     }

@@ -1,6 +1,6 @@
 //! Statistics of a servo bus: questions, answers, goals and round-trip times.
 //!
-//! They are taken from the bytes of both directions. Time is an argument.
+//! They are computed from the bytes of both directions. Time is an argument.
 
 use std::fmt;
 

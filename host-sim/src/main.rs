@@ -50,7 +50,8 @@ use failure::Failure;
 /// The log target of frames. `--trace` shows it at any log level.
 const FRAMES: &str = "frames";
 
-/// With --lockstep virtual time starts here, so that the servos have started: no virtual time passes before the first byte.
+/// With --lockstep, virtual time starts at 1 s, when the servos have already started: no virtual time passes before the first
+/// byte.
 const LOCKSTEP_START: Instant = Instant::from_micros(1_000_000);
 
 fn main() -> ExitCode {
@@ -313,8 +314,8 @@ fn flash(options: &Options, number: Option<u16>) -> Result<Flash<ImageFile>, Fai
     Ok(options.eeprom.as_ref().unwrap_or(&default).open(number)?)
 }
 
-/// Raises the limit of open files to the highest value that the system allows. An arm needs three. If the limit is too low,
-/// opening the port fails.
+/// Raises the limit of open files to the highest value that the system allows. An arm needs two for its port, and one each for
+/// the settings, the control socket and the recording. If the limit is too low, opening the port fails.
 fn allow_as_many_files_as_possible() {
     let limit = getrlimit(Resource::Nofile);
     let _ = setrlimit(Resource::Nofile, Rlimit { current: limit.maximum, ..limit });

@@ -152,7 +152,7 @@ impl<F: NorFlash + Clone, B: ServoBus, C: ArmController> PtyArm<F, B, C> {
         self.is_strict = true;
     }
 
-    /// Do bytes pass between the client and the arm? Always, unless the rate is checked and the client has another one.
+    /// Do bytes pass between the client and the arm? Always, unless the baud rate is checked and the client has another rate.
     fn has_clients_rate(&self) -> io::Result<bool> {
         Ok(!self.is_strict || self.pty.baud()? == self.simulation.baud())
     }

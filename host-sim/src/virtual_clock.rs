@@ -72,7 +72,7 @@ impl Default for VirtualClock {
 }
 
 impl VirtualClock {
-    /// A clock in lockstep with the client, which starts at `start`. `timeout` is real time.
+    /// A clock in lockstep with the client. Virtual time starts at `start`. `timeout` is real time.
     #[must_use]
     pub fn in_lockstep(start: Instant, timeout: Duration) -> Self {
         let lockstep = Some(ClientLockstep { timeout, since: Instant::ZERO });

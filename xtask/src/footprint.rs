@@ -12,10 +12,10 @@ use linked_image::{CallGraph, Depth};
 const RAM: u64 = 0x2000_0000;
 /// The cores in the paths of source files, and in the names of data.
 const CORES: &[(&str, &str)] = &[("protocol-core/", "protocol_core::"), ("motion-core/", "motion_core::")];
-/// The program that counts the path, and the one with a server that does nothing.
+/// The program with the parse-and-reply path, and the program with a server that does nothing.
 const OURS: ChipProgram = ChipProgram { name: "count_ours", profile: SMALL };
 const NOTHING: &str = "count_nothing";
-/// The function that a server is called from.
+/// The function that calls the server.
 const FEED: &str = "footprint::count_server::feed";
 
 /// Measures, prints, and compares the sizes with their budgets.

@@ -33,7 +33,7 @@ struct Panic<'a> {
     calls: Vec<Call<'a>>,
 }
 
-/// A call of a panic, from a function with another purpose.
+/// A call of a panic, from a function that is not a panic itself.
 struct Call<'a> {
     caller: &'a str,
     /// Lines of source, innermost first.
@@ -52,8 +52,8 @@ fn panics<'a>(program: &'a Program<'_>) -> TaskResult<Vec<Panic<'a>>> {
     Ok(found)
 }
 
-/// The calls of a panic that come neither from other panics nor from [`EXEMPT`] packages, and whether the panic has calls, but
-/// none of these. A panic without calls counts as reachable, because its address must be in use.
+/// The calls of a panic that come neither from other panics nor from [`EXEMPT`] packages. The second value is true if the panic
+/// has calls, but only from these. A panic without any call counts as reachable, because its address must be in use.
 fn calls_to<'a>(program: &'a Program<'_>, panic: &Symbol) -> TaskResult<(Vec<Call<'a>>, bool)> {
     let addresses = program.calls_to(panic.address);
     let mut calls = Vec::new();

@@ -38,8 +38,8 @@ impl TestArgs {
 /// Seconds of fuzzing for each target, with another seed in each run.
 const LONG_FUZZ_SECONDS: u64 = 300;
 
-/// The steps, in order, until one fails. Steps that mostly wait run beside steps that compute. Tests come last, so
-/// that their output is at the end.
+/// The stages, in order. A run ends when a step fails. Steps that mostly wait run beside steps that compute. The tests that every
+/// run includes come last, so that their output is at the end.
 const STAGES: &[Stage] = &[
     &[&[quick("tools that the steps need", install::all), quick("format", || cargo("fmt --all --check"))]],
     &[

@@ -44,7 +44,7 @@ pub(crate) fn interpreter(what: &str, versions: RangeInclusive<Version>) -> Task
     found.map(|(_, program)| program).ok_or_else(none)
 }
 
-/// The programs that are a Python, with their versions. Each version is there once.
+/// The programs that are Python interpreters, with their versions. Of several programs with the same version, only the first.
 fn with_versions(programs: impl Iterator<Item = PathBuf>) -> Vec<(Version, PathBuf)> {
     let mut found: Vec<(Version, PathBuf)> = Vec::new();
     for program in programs {

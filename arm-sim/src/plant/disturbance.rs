@@ -108,8 +108,8 @@ impl Plant {
         self.servos_mut().iter_mut().for_each(|servo| servo.support(is_supported));
     }
 
-    /// Switches power off and on: torque, goals and answers are lost, faults stay. A hand holds each joint until it has
-    /// torque.
+    /// Switches power off and on: torque, goals and answers are lost, the pump stops, faults stay. A hand holds each joint until
+    /// the joint has torque.
     pub fn power_cycle(&mut self, now: Instant) {
         self.advance(now);
         self.supply.switch(true);
@@ -123,7 +123,7 @@ impl Plant {
         self.wire.clear();
     }
 
-    /// Switches the power of all servos off at `now`, until [`Plant::power_cycle`]. No hand holds a joint.
+    /// Switches the power of all servos off at `now`, until [`Plant::power_cycle`]. The pump stops, and no hand holds a joint.
     pub fn power_off(&mut self, now: Instant) {
         self.advance(now);
         self.supply.switch(false);

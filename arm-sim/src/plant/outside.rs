@@ -20,7 +20,8 @@ pub struct OutsideState {
     pub angle: i32,
     /// In thousandths of a degree per second.
     pub velocity: i32,
-    /// The torque of the motor at standstill in 0.1 % of the stall torque, positive towards greater angles.
+    /// The duty of the motor in 0.1 %, positive towards greater angles. At standstill, it is the torque in 0.1 % of the stall
+    /// torque.
     pub load: i16,
 }
 

@@ -1,8 +1,9 @@
 //! The temperature of a simulated servo. The heat of its windings grows with the square of the torque, and the temperature
 //! follows with a time constant.
 //!
-//! A servo that is stalled at full duty shows more than 80 degrees after 99 s. A servo that holds 40 % settles at 56 degrees;
-//! without the rounding in each update it would be 57. The values are in [`parameters`](crate::parameters).
+//! A servo that is stalled at full duty shows more than 80 degrees after 99 s. A servo that holds 40 % of its stall
+//! torque settles at 56 degrees; without the rounding in each update it would be 57. The values are in
+//! [`parameters`](crate::parameters).
 
 use crate::parameters::{AMBIENT_MILLIDEGREES, STALL_RISE_MILLIDEGREES, THERMAL_TIME};
 

@@ -1,4 +1,5 @@
-//! Faults of a running arm, each until it is removed or its time is over, the timing of its host line, and drops.
+//! Faults of a running arm, each until it is removed or its time is over. Also the seed and the deadlines of the host line, and
+//! the release of everything that the tool holds.
 
 use alloc::vec::Vec;
 
@@ -24,7 +25,8 @@ impl<F: NorFlash, C: ArmController> SimulatedArm<F, Plant, C> {
         &self.controller
     }
 
-    /// Sets the seed of the random faults of the host line, 1 by default. The bytes on the host line are lost.
+    /// Sets the seed of the random faults of the host line, 1 by default. The bytes on the host line are lost, and the counts of
+    /// its faults begin again at 0.
     pub fn set_seed(&mut self, seed: u64) {
         self.record_action(self.now, Action::Seed(seed));
         (self.to_arm, self.to_host) = LineDirection::pair(seed);

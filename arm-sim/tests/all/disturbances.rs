@@ -170,7 +170,8 @@ fn a_weight_in_the_gripper_loads_the_joints_until_a_servo_gives_up() {
     let unloaded = load(&arm);
     arm.plant_mut().set_load(150);
     arm.advance(millis(1_000));
-    // 150 g at 288.5 mm are 424 of 2450 mN m, which is a load of 173. Friction carries a part in both measurements.
+    // 150 g at 288.5 mm are a torque of 424 mN m. With a stall torque of 2450 mN m, this is a load of 17.3 %, or 173. Friction
+    // carries a part of the torque in both measurements.
     assert!((150..=180).contains(&(load(&arm) - unloaded)), "{unloaded}, then {}", load(&arm));
     arm.plant_mut().set_load(1_000);
     arm.advance(millis(3_000));

@@ -25,7 +25,7 @@ const fn wall(degrees: i32, stiffness: Option<u16>) -> Option<Wall> {
     Some(Wall { millidegrees: degrees * 1_000, stiffness })
 }
 
-/// Did the forearm rise to this goal? A weight of 459 mN m and 123 mN m of friction are 4.8 counts.
+/// Did the forearm rise to this goal? A weight of 459 mN m and a friction of 123 mN m leave it at most 4.8 counts below the goal.
 fn is_lifted(rig: &Rig, goal: u16) -> bool {
     (0..=5).contains(&goal.saturating_sub(rig.counts(FOREARM)))
 }
@@ -110,7 +110,8 @@ fn a_hand_pushes_towards_greater_angles() {
             assert!(pushed > 200, "joint {}: {pushed}", joint.number());
             rig.plant.push(joint, 0);
             rig.pass(500);
-            // Friction holds up to 123 of 2450 mN m at either side: 0.43 degrees.
+            // Friction holds up to 123 mN m in each direction, so two positions at rest differ by up to 246 mN m. With the stall
+            // torque of 2450 mN m at 4.3 degrees of error, this is 0.43 degrees.
             let left = rig.plant.angle(joint) - before;
             assert!(left.abs() < 440, "joint {}: {left}", joint.number());
             assert_eq!(rig.plant.push_count(joint).effects, 0, "a new push counts anew");
@@ -147,7 +148,8 @@ fn a_soft_thing_is_pressed_and_can_be_dropped() {
     rig.plant.set_load(50);
     set_claw(&mut rig, 820);
     rig.pass(2_000);
-    // The goal is 4.1 degrees beyond the thing. The servo has the same stiffness: 588 mN m in 4.3 degrees, 137 per degree.
+    // The goal is 4.1 degrees beyond the thing. The servo has the stiffness of the thing: 588 mN m in 4.3 degrees, which is
+    // 137 mN m per degree. So the claws stop halfway.
     let depth = 30_000 - rig.plant.angle(CLAW);
     assert!((1_900..2_200).contains(&depth), "{depth}");
     assert!(rig.plant.thing_count().effects > 500);
@@ -162,7 +164,8 @@ fn a_blocked_joint_trips_after_a_second_and_latches() {
         let mut rig = Rig::driven();
         rig.plant.set_wall(BASE, wall(90, None));
         rig.pass(1);
-        // 80 % of 20.3 counts are 16.2.
+        // An overload is a torque above 80 % of the stall torque. An error of 20.3 counts gives the stall torque, 16.2 counts
+        // 80 %.
         turn_base(&mut rig, 511 + error_counts);
         rig.pass(990);
         assert_eq!(errors(&mut rig, BASE), 0, "not before a second");
@@ -263,7 +266,7 @@ fn register_19_tells_which_alarms_free_a_joint() {
 fn a_joint_that_holds_40_percent_for_an_hour_stays_below_its_limit() {
     let mut rig = Rig::driven();
     rig.plant.set_thing(Some(Thing { millidegrees: 30_000, stiffness: None }));
-    // 40 % of 14.9 counts are 6, beyond 834 counts.
+    // An error of 14.9 counts gives full duty, 6 counts 40 %. The claws touch the thing at 834 counts.
     set_claw(&mut rig, 828);
     (0..60).for_each(|_| rig.pass(60_000));
     let (reading, errors) = rig.reading(CLAW).unwrap();

@@ -1,4 +1,4 @@
-//! A whole arm in virtual time: which bytes reach the host, when, and that late calls change nothing.
+//! A whole arm in virtual time: the bytes at the host and their times, late calls, power cycles, and a flash that fails.
 
 use arm_sim::flash::{Cells, ERASED, Flash};
 use arm_sim::pace;

@@ -1,4 +1,5 @@
-//! The simulation with its own clock: the same calls give the same bytes, however time is cut into pieces.
+//! The simulation with its own clock: its results do not depend on the pieces in which time passes. Also copies, settings and the
+//! bytes of a host that sends too much.
 
 use arm_sim::request::Request;
 use arm_sim::{Duration, Joint, ServoFault, Simulation};

@@ -66,7 +66,7 @@ pub enum ControlRequest {
     Pause,
     /// Lets virtual time go on after a pause.
     Resume,
-    /// Lets this virtual time pass as fast as possible. The answer comes at the end of this time.
+    /// Lets this much virtual time pass as fast as possible. The answer comes at its end.
     Advance {
         /// The time in milliseconds.
         ms: u64,

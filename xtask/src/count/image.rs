@@ -24,17 +24,18 @@ const HOST_DATA: u64 = 0x4001_1004;
 const SERVO_DATA: u64 = 0x4000_4404;
 /// The largest number of requests for one count.
 const TRIES: usize = 400;
-/// The sufficient number of undisturbed requests.
+/// A count ends after this many undisturbed requests.
 const SAMPLES: usize = 24;
 /// The time of a log of the moving arm: about forty control cycles.
 const WATCH_TIME: Duration = Duration::from_secs(4);
 /// The largest number of logs. A busy machine may show few control cycles in one log.
 const MAX_WATCHES: usize = 20;
-/// The sufficient number of control cycles.
+/// The number of control cycles that a log of the moving arm must show.
 const MIN_CYCLES: usize = 20;
 /// The time of a log of the idle arm.
 const SILENCE: Duration = Duration::from_secs(4);
-/// The period of the idle arm in milliseconds: it reads missing servos ten times a second, and its LED goes on or off twice.
+/// A log of the idle arm must have this many milliseconds. In this time, the arm reads missing servos five times, and its LED
+/// goes on or off about twice.
 const PATTERN_MILLIS: usize = 500;
 /// The log lines of each second.
 const LOG_LINES: usize = 3;
@@ -128,7 +129,7 @@ pub(crate) fn figures() -> TaskResult<Vec<Figure>> {
     Ok(figures)
 }
 
-/// Logs the arm while all joints move. If a busy machine shows too few control cycles, logs the move back as well.
+/// Logs the arm while all joints move. If a log shows too few control cycles, as on a busy machine, logs the next move instead.
 fn while_moving(image: &mut LoggedImage) -> TaskResult<Vec<TraceEvent>> {
     image.send(&frame(Request::Write { address: SPEED.address, values: &[5; JOINTS] }))?;
     for target in [0, 90].into_iter().cycle().take(MAX_WATCHES) {

@@ -43,7 +43,7 @@ const PER_BYTE_SENT: u64 = 59 + 38;
 /// The most attempts. On a busy computer the image may miss ticks, and then it sends fewer reports than it should.
 const ATTEMPTS: usize = 4;
 
-/// The load as one figure. The part of the sent bytes is computed, the rest is counted.
+/// The load as one figure. The instructions for sent bytes are computed from the number of bytes; all others are counted.
 pub(super) fn figure() -> TaskResult<Figure> {
     for _ in 0..ATTEMPTS {
         let (steps, reported) = count()?;

@@ -59,8 +59,8 @@ fn maturin(release: &Release, what: &str, triple: &str) -> TaskResult<Command> {
     Ok(maturin)
 }
 
-/// setuptools leaves files beside the sources, so it gets a copy. The wheel may be for a later version of Python than
-/// this program uses.
+/// setuptools leaves files beside the sources, so it gets a copy. The package may require a later version of
+/// Python than the one that runs pip.
 fn write_pure(release: &Release, folder: &str, name: &str) -> TaskResult {
     let copy = build_directory().join("python").join(name);
     fs::create_dir_all(build_directory().join("python"))?;

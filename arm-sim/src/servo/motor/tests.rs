@@ -4,8 +4,8 @@ use crate::servo::surroundings::{Side, Surface};
 
 /// A motor may arrive this much later than its set-point.
 const SETTLING_MS: u32 = 250;
-/// Static friction holds a joint within this distance of its set-point: 100 of 2450 mN m are 0.83 of the 20.3 counts for full
-/// duty.
+/// Static friction holds a joint within this distance of its set-point. An error of 20.3 counts gives the stall torque,
+/// 2450 mN m, so the friction of 100 mN m holds an error of 0.83 counts.
 const FRICTION_COUNTS: u16 = 1;
 
 fn motor(joint: usize) -> Motor {
@@ -107,7 +107,8 @@ fn following_error_and_load_are_those_of_the_speed_and_the_friction() {
     for (target, sign) in [(700, 1), (0, -1)] {
         motor.start(goal(target, 0, 300));
         steps(&mut motor, 1_000, Driven);
-        // Speed, 300 of 1756 counts/s: 17.1 %. Friction, 80 of 2450 mN m: 3.3 %.
+        // Duty for the speed: 300 of 1756 counts/s, 17.1 %. Duty for the friction: 80 mN m of the stall torque of 2450 mN m,
+        // 3.3 %.
         assert!((300 - motor.speed() * sign).abs() <= 1, "{}", motor.speed());
         assert!((200..=207).contains(&(motor.load() * sign)), "{}", motor.load());
         assert!((29..=36).contains(&(motor.torque() * sign)), "{}", motor.torque());
@@ -178,7 +179,8 @@ fn a_driven_motor_droops_by_its_load_less_the_friction() {
         motor.surroundings.inertia = 20_000_000;
         motor.start(goal(500, 0, 300));
         steps(&mut motor, 3_000, Driven);
-        // 1000 of 2450 mN m are 8.29 counts; 150 mN m of friction are 1.24 counts.
+        // An error of 20.3 counts gives the stall torque, 2450 mN m. So the weight, 1000 mN m, needs 8.29 counts. Friction, at
+        // most 150 mN m, changes this by at most 1.24 counts.
         let droop = (motor.position - 500 * COUNT) * sign;
         assert!((7_050_000..9_530_000).contains(&droop), "{droop}");
         let load = -droop * sign * 1_000 / 20_305_555;
@@ -213,7 +215,8 @@ fn torque_stops_a_fall() {
     let caught_at = motor.position_counts();
     assert!((400..480).contains(&caught_at), "{caught_at}");
     steps(&mut motor, 500, Driven);
-    // The joint was falling when it got torque. 400 of 2450 mN m are 3.3 counts of droop.
+    // The joint was falling when it got torque. Its weight, 400 mN m of the stall torque of 2450 mN m, makes it droop by
+    // 3.3 counts.
     assert!((1..=9).contains(&(caught_at - motor.position_counts())), "{}", motor.position_counts());
 }
 
