@@ -1,7 +1,7 @@
 //! Measures how the arm behaves at obstacles, with the image in the emulator as the controller: `cargo xtask obstacles` builds
 //! the image and runs this.
 //!
-//! It makes a few of the experiments of `torture obstacles`, and prints the same tables. The experiments run in real time, so a
+//! It runs a few of the experiments of `torture obstacles`, and prints the same tables. The experiments run in real time, so a
 //! busy machine increases the figures.
 
 use std::error::Error;
@@ -14,7 +14,7 @@ use protocol_core::request::Request;
 use protocol_core::time::{Duration, Instant};
 use torture::obstacles::{Experiments, ObstacleArm};
 
-/// A step of an experiment.
+/// The time of one call of [`ObstacleArm::step`].
 const STEP: Duration = Duration::from_millis(1);
 
 fn main() -> TaskResult {
@@ -23,7 +23,6 @@ fn main() -> TaskResult {
     Ok(())
 }
 
-/// The arm of the experiments.
 struct Arm(EmulatedArm);
 
 impl ObstacleArm for Arm {

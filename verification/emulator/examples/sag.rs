@@ -20,7 +20,7 @@ use torture::sag::{
 };
 use torture::seeded_rng::SeededRng;
 
-/// The period of the noise.
+/// The time between two bursts of [`NOISE_BYTES`] random bytes.
 const NOISE_PERIOD: Duration = Duration::from_millis(1);
 /// The symbol of the panic handler.
 const PANIC_HANDLER: &str = "rust_begin_unwind";

@@ -1,4 +1,4 @@
-//! The image in real time, with its servos in this process.
+//! Runs the image in the emulator in real time, with its simulated servos in this process.
 
 use std::io::{ErrorKind, Read, Write};
 use std::os::unix::net::UnixStream;

@@ -8,7 +8,7 @@
 //!                                               └──────────┘
 //! ```
 //!
-//! The ports of QEMU itself detect clients only once a second, and drop bytes before that.
+//! QEMU's own ports detect a new client only once a second. They drop bytes until then.
 
 use std::io::{self, BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};

@@ -1,10 +1,10 @@
-//! The image in virtual time, with its servos in this process.
+//! Runs the image in the emulator in virtual time, with its simulated servos in this process.
 //!
 //! ```text
 //!   the image is about to sleep ──▶ stop: take what it sent, give it at most one byte per line ──▶ go on
 //! ```
 //!
-//! Virtual time stands still during a stop, so the time of this process does not count. An instruction takes 8 ns. The
+//! Virtual time stands still during a stop, so the time that this process needs does not count. An instruction takes 8 ns. The
 //! image sleeps in real time: a busy computer may end a sleep late, and then a tick is late or lost. A byte arrives only
 //! at a stop, so the first byte of a frame is up to one tick, 1 ms, late. The next bytes arrive one per stop, each with its
 //! own interrupt.
@@ -25,9 +25,9 @@ use crate::machine::Machine;
 use crate::process::TaskResult;
 use crate::trace::TraceEvent;
 
-/// The count of TIM2, the clock of the image, in microseconds.
+/// The address of TIM2_CNT, the clock of the image, in microseconds.
 const CLOCK: u32 = 0x4000_0024;
-/// The status registers of the USARTs of host link and servo bus (RM0090, section 30.6.1).
+/// The addresses of the status registers of the USARTs of host link and servo bus (RM0090, section 30.6.1).
 const HOST_STATUS: u32 = 0x4001_1000;
 const SERVO_STATUS: u32 = 0x4000_4400;
 /// Bit RXNE of a status register: a received byte waits in the USART.

@@ -4,7 +4,7 @@
 //!   _SEGGER_RTT: │ name: 16 bytes │ channels up, down │ name │ buffer │ size │ written to │ read to │ flags │
 //! ```
 //!
-//! No debugger advances "read to" here, and the firmware does not wait for it. If the firmware writes more than the
+//! No debugger advances "read to" here, and the firmware writes without waiting for that. If the firmware writes more than the
 //! buffer holds between two polls, log entries are lost.
 
 use std::io::Write;
@@ -17,7 +17,7 @@ use object::{Object, ObjectSymbol};
 use crate::monitor::Monitor;
 use crate::process::{ChildProcess, TaskResult};
 
-/// Bytes of the control block with its first channel.
+/// The length in bytes of the control block up to the end of its first channel.
 const CONTROL_BLOCK: u32 = 48;
 
 /// Copies the log from the chip's memory to the input of defmt-print.

@@ -35,7 +35,7 @@ impl LoggedImage {
         let servos = start_servos(&folder, &[], None)?;
         let bus = servo_socket(&folder);
         let mut image = Self::start(folder, Some(servos), &bus, "shift=0,sleep=on")?;
-        // Check twice: before their first read, no servos are reported as missing.
+        // Check twice: the arm reports a servo as missing only after failed reads, so the first check may come too early.
         for _ in 0..2 {
             sleep(Duration::from_secs(1));
             while image.read(MISSING_SERVOS.address, 1)? != [0] {
@@ -89,7 +89,7 @@ impl LoggedImage {
         self.reply(count)
     }
 
-    /// Waits for all pending replies, and drops them.
+    /// Sends an empty read, and drops all replies up to its reply.
     pub fn settle(&mut self) -> TaskResult {
         self.machine.host.write_all(&frame(Request::Read { address: 0, count: 0 }))?;
         loop {

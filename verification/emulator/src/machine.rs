@@ -60,7 +60,7 @@ impl Machine {
         Ok(Self { monitor, host, _child: child, folder })
     }
 
-    /// Starts the image for the arm. Returns this process's end of the servo bus, too, for servos in this process.
+    /// Starts the image for the arm. Also returns this process's end of the servo bus, for servos in this process.
     pub(crate) fn start_with_bus(folder: TempDir, options: &[&str]) -> TaskResult<(Self, UnixStream)> {
         let bus = listen(&folder, "servos")?;
         let servos = servo_socket(&folder);

@@ -18,7 +18,7 @@ pub fn accept(listener: &UnixListener) -> TaskResult<UnixStream> {
 /// A connection to the monitor.
 pub struct Monitor {
     stream: BufReader<UnixStream>,
-    /// The file for the transfer of memory.
+    /// The file into which the emulator writes memory for [`Self::memory`].
     scratch: PathBuf,
 }
 

@@ -1,7 +1,7 @@
 //! Parses the emulator's log of executed instructions (`-singlestep`, `log exec`) and of accesses to peripherals.
 //!
 //! ```text
-//!   Trace 0: 0x7f81a8 [00800409/0800c096/00000010/ff020201] USART1    about to execute; bit 0: in a handler
+//!   Trace 0: 0x7f81a8 [00800409/0800c096/00000010/ff020201] USART1    about to execute; bit 0 of 00800409: in a handler
 //!   Stopped execution of TB chain before 0x7f81a8 [0800c096] USART1   it was not executed after all
 //!   cpu_io_recompile: rewound execution of TB to 0800c0c4             not executed either
 //!   memory_region_ops_read cpu 0 mr 0x55 addr 0x40011000 value ...    a read of a peripheral

@@ -40,7 +40,7 @@ struct Bits {
 pub struct Flash<const SECTOR: usize, const WORD: usize = 4> {
     /// The present contents.
     cells: Vec<u8>,
-    /// The value that was requested for each word since the last erase of its sector; all ones if none was.
+    /// The value that was requested for each word since the last erase of its sector; all ones without a request.
     requested: Vec<u8>,
     /// Bits that may read differently after the next power-up.
     marginal: Vec<Bits>,

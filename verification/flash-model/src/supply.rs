@@ -55,7 +55,7 @@ impl Comparator {
         Self { falls_below, rises_above, is_low: true }
     }
 
-    /// Compares the present voltage. Returns true if the supply is low.
+    /// Compares the present voltage with the threshold. Returns true if the supply is low.
     pub const fn is_low(&mut self, millivolts: u32) -> bool {
         let threshold = if self.is_low { self.rises_above } else { self.falls_below };
         self.is_low = millivolts < threshold;

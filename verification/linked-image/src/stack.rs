@@ -98,9 +98,9 @@ impl<'a> CallGraph<'a> {
         Ok(deepest)
     }
 
-    /// The largest stack of the whole program: the program after reset, interrupted by every other exception once, each at the
-    /// worst moment of the exception before. Priorities allow less nesting than that. A hard fault starts a new stack. The result
-    /// includes the stack of two panics in the logger.
+    /// The largest stack of the whole program: the program after reset, interrupted by every other exception once, each when the
+    /// stack of the one before it is deepest. Priorities allow less nesting than that. A hard fault starts a new stack. The
+    /// result includes the stack of two panics in the logger, because `GUARDS` leaves out these calls.
     pub fn worst(&self, program: &Program<'_>) -> ReadResult<Depth> {
         let [reset, handlers @ ..] = program.handlers() else { Err("no vector table")? };
         let mut whole = self.depth(*reset)?;

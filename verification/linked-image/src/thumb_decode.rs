@@ -72,7 +72,8 @@ fn effect_of(at: u64, length: u64, instruction: &Instruction) -> Effect {
         SMC, SRS, STR, STRB, STRD, STRH, SUB, TBB, TBH, TEQ, TST, WFI,
     };
     let [first, second, third, _] = instruction.operands;
-    // The decoder counts short conditional branches from the next instruction, and all others from the address plus 4.
+    // The decoder counts the distance of a short conditional branch (also CBZ and CBNZ) from the next instruction, and all other
+    // distances from the address plus 4.
     let is_short_condition = instruction.condition != ConditionCode::AL && length == 2;
     let target = |origin: u64, halfwords: i32| (at + origin).wrapping_add_signed(2 * i64::from(halfwords));
     match (instruction.opcode, first, second) {
@@ -171,7 +172,7 @@ const fn write_special(second: u16) -> Effect {
     }
 }
 
-/// The instructions of coprocessors 10 and 11. This core has no other coprocessor.
+/// The effect of a coprocessor instruction. Coprocessors 10 and 11 are the floating-point unit; this core has no other.
 fn floating_point(first: u16, second: u16) -> Effect {
     let is_floating_point = second >> 9 & 0b111 == 0b101;
     match first & 0xFFBF {

@@ -1,5 +1,5 @@
 //! Random sessions with a simulated arm, recorded and replayed. `cargo xtask replays` runs them natively and as a
-//! WebAssembly module, and compares.
+//! WebAssembly module, and compares the results.
 
 pub mod random_session;
 

@@ -30,10 +30,10 @@ const ACTIONS: [&str; 13] = [
     "scene table 190; cube red 40 100 40 260; cylinder can 40 60 200 -40 250",
     "scene off",
 ];
-/// Faults of a servo, and walls and pushes that a joint meets. Each lasts for a time in [`SHORTLY`].
+/// Faults of a servo, and walls and pushes that a joint meets. Each lasts for one of the times in [`SHORTLY`].
 const JOINT_FAULTS: [&str; 8] =
     ["late=20", "garbled=3", "stuck", "missing", "wall=80", "wall=100/500", "push=700", "push=-700"];
-/// Other faults that last for a time in [`SHORTLY`].
+/// Other faults that last for one of the times in [`SHORTLY`].
 const SHORT_FAULTS: [&str; 3] = ["7=thing=30", "7=thing=60/100", "supply=off"];
 /// How long the faults of [`JOINT_FAULTS`] and [`SHORT_FAULTS`] last, in microseconds. After the longer time without supply,
 /// the arm enters state 0 (D29).

@@ -1,5 +1,5 @@
-//! Runs a campaign on all processors: worlds until the time is used up or a rule is violated, then trials of free motion and
-//! of the parser.
+//! Runs a campaign on all processors: worlds until the time is used up or a rule is violated. If no world fails, trials of free
+//! motion and of the parser follow.
 
 use std::collections::BTreeMap;
 use std::ops::Range;

@@ -10,8 +10,8 @@ pub(crate) const LINKAGE: (i32, i32) = (84_000_000, 226_000_000);
 /// Goals are rounded to counts of up to 0.212 degrees. This allows two counts of each of the two joints, in microdegrees.
 const ROUNDING: i32 = 2 * 2 * 212_000;
 
-/// The smallest excess of the goals over the linkage since both joints are driven, in microdegrees; `None` before
-/// the first check.
+/// The smallest excess of the goals over the linkage since the last reset, in microdegrees; `None` before the first
+/// check.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct LinkageGoals(Option<i32>);
 
@@ -22,7 +22,8 @@ impl LinkageGoals {
     }
 
     /// Checks the goals of joints 2 and 3 in counts, with the offsets of these joints; `None` for a joint that is not
-    /// driven. If the first goals are outside the linkage, where a hand may have left the arm, later goals must move inwards.
+    /// driven. If the first goals are outside the linkage, where a hand may have left the arm, later goals must not move
+    /// outwards.
     pub(crate) fn check(&mut self, goals: [Option<u16>; 2], offsets: [i8; 2]) -> Check {
         let [Some(two), Some(three)] = goals else {
             self.reset();

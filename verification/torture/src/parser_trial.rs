@@ -15,7 +15,8 @@ pub struct ParserTrial {
     pub frames: usize,
     /// Good frames that the parser did not return.
     pub lost: usize,
-    /// The longest time from the last byte of a good frame to its return, less the duration of its burst, in microseconds.
+    /// The longest time from the last byte of a good frame to its return, less the duration of the burst of frames that contains
+    /// it, in microseconds.
     pub worst_delay_us: u64,
 }
 

@@ -45,7 +45,7 @@ pub enum SagCause {
     WarmRestart,
     /// The program hangs for two seconds, then the watchdog restarts the controller.
     Watchdog,
-    /// The program panics, puts every servo into state 0 four times, and restarts.
+    /// The program panics, commands damping (state 0) to all servos four times, and restarts.
     Panic,
     /// Three seconds of random bytes to the servos, while each reply has an invalid checksum.
     Noise,

@@ -62,7 +62,7 @@ pub struct Scenario {
     pub description: &'static str,
     /// The mean time between two faults.
     pub mean_interval: Duration,
-    /// The faults, each with the same probability. A fault that is listed twice is twice as likely.
+    /// Each entry has the same probability, so a fault that is listed twice is twice as likely.
     pub faults: &'static [InjectedFault],
     /// The number of writes of settings in a thousand writes.
     pub settings_per_mille: u64,

@@ -1,4 +1,4 @@
-//! The controller with any host bytes, servo replies, delays, host link room and storage results.
+//! Runs the controller with any host bytes, servo replies, delays, free space on the host link and storage results.
 
 mod controller_loop;
 mod extended_block;

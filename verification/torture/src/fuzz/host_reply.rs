@@ -1,5 +1,5 @@
-//! The host library with any bytes from the arm: frames, snapshots and names of registers. Also any text for the name of a
-//! register.
+//! Runs the host library on any bytes from the arm, and checks frames, snapshots and register names. Also parses any text as a
+//! register name.
 
 use arbitrary::Arbitrary;
 use protocol_core::registers::map21::find_readable;

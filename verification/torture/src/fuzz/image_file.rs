@@ -1,5 +1,5 @@
-//! The simulator's settings image with any content. Either the file is refused and not changed, or its settings are in range
-//! (D19), stay the same after every start, and can be replaced.
+//! The simulator's settings image with any content. A file of another length is refused. A damaged file is refused and not
+//! changed. The settings of any other file are in range (D19), stay the same after a restart, and can be replaced.
 
 use std::fs;
 use std::path::Path;

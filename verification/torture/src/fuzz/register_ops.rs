@@ -1,4 +1,4 @@
-//! The register file against a model with its own tables, written only from sections 3, 8, 9 and 10 of `docs/protocol.md`.
+//! The register file against a model with its own tables, written from `docs/protocol.md` and `docs/registers.md`.
 
 use arbitrary::Arbitrary;
 use protocol_core::registers::map::{FRAMES_ACCEPTED, FRAMES_CORRUPTED};
@@ -237,7 +237,8 @@ fn is_word(low: u8, word: u16) -> bool {
     if low == 184 { word == 0 || (5..=1_000).contains(&word) } else { word <= 18_000 }
 }
 
-/// True if `value` is in the range of the writable register at `address`, according to `docs/protocol.md`.
+/// True if `value` is in the range of the writable one-byte register at `address`, according to `docs/registers.md` and, for map
+/// 2.1, section 8 of `docs/protocol.md`.
 fn is_in_range(map: Map, address: u8, value: u8) -> bool {
     let max = match (map, address) {
         (_, 12) => 7,

@@ -42,7 +42,7 @@ pub enum LoadError {
     /// A read or a write of the port failed, for example because the port was removed.
     #[error("the port is gone: {0}")]
     Gone(#[from] io::Error),
-    /// The duration is not above 0.
+    /// The duration is not above 0, or too long for a [`Duration`](std::time::Duration).
     #[error("--minutes {0}: use a number above 0")]
     Minutes(f64),
 }

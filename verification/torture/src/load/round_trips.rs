@@ -28,7 +28,7 @@ impl RoundTrips {
         self.worst = self.worst.max(took);
     }
 
-    /// A quantile in milliseconds: this many thousandths of the round trips do not take longer.
+    /// The time in milliseconds that this many thousandths of the round trips do not exceed; 0 without round trips.
     fn quantile_ms(&self, thousandths: u64) -> f64 {
         let rank = self.counts.iter().sum::<u64>() * thousandths / 1_000;
         let mut seen = 0;

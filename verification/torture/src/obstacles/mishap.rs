@@ -1,4 +1,4 @@
-//! Alarms that are forced on a servo, and emergency stops, while the arm follows a stream of points.
+//! Alarms that are forced on a servo, and emergency stops. A stream of points for joint 1 begins with each of them.
 
 use arm_sim::plant::SupplyFault;
 use arm_sim::servo::Trip;
@@ -9,15 +9,15 @@ use protocol_core::time::Duration;
 use super::arm::{ObstacleArm, PERIOD_MS, SETTLE_TIME, degrees, start};
 
 const PAYLOAD_G: u16 = 100;
-/// The point that is streamed, in hundredths of a degree: 40 degrees from the position of joint 1.
+/// The point that is streamed, in hundredths of a degree: 40 degrees from the standard pose of joint 1.
 const POINT: u16 = 13_000;
 /// The time of the measurement after an alarm, or after the supply came back.
 const AFTER_TIME: Duration = Duration::from_millis(4_000);
 
-/// What happens to an arm while it follows a stream.
+/// A forced alarm, or an emergency stop.
 #[derive(Clone, Copy, Debug)]
 pub enum Mishap {
-    /// An alarm of joint 3.
+    /// An alarm that is forced on the servo of one joint.
     Trip(Trip),
     /// The servos are without supply for this many milliseconds.
     EmergencyStop(u64),
@@ -85,7 +85,8 @@ fn cells<A: ObstacleArm>(mishap: Mishap, is_protected: bool) -> Result<String, A
     Ok(format!("{} | {fastest} °/s | {state}", degrees(sag)))
 }
 
-/// Streams the same far point for this time. Returns the greatest speed between two points, in degrees per second.
+/// Streams the same far point for this time. Returns the greatest speed of the joint between two writes,
+/// in degrees per second.
 fn stream<A: ObstacleArm>(arm: &mut A, joint: Joint, time: Duration) -> Result<u64, A::Error> {
     let end = arm.now() + time;
     let mut fastest = 0;

@@ -15,7 +15,8 @@ const DRIVEN_TIME: Duration = Duration::from_millis(400);
 /// The time of the measurement after an alarm, or after the supply came back.
 const AFTER_TIME: Duration = Duration::from_millis(6_000);
 
-/// How far a joint fell and swung. Angles are in thousandths of a degree.
+/// How far a joint fell without torque (`fall`), and how far it turned after the torque came back (`swing`). Angles are in
+/// thousandths of a degree.
 #[derive(Clone, Copy, Debug)]
 struct Fate {
     begun: i32,

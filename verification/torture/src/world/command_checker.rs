@@ -35,8 +35,8 @@ use crate::world_counts::WorldCounts;
 /// If a joint gets no goal for this long although its servo answers, it is let go because of an alarm, and no longer driven.
 const LET_GO_TIME: Duration = Duration::from_millis(10_000);
 
-/// Counts of one control cycle at 372 degrees/s. A set-point may be ahead of the last goal by one cycle, and by one more
-/// for each cycle in which a read delays the goals.
+/// Counts of one control cycle at 372 degrees/s: 17.6, and a margin. A set-point may be ahead of the last goal by one cycle, and
+/// by one more for each cycle in which a read delays the goals.
 const ONE_CYCLE: u16 = 19;
 
 /// The checker, with the state that follows from the commands and replies so far.
@@ -55,8 +55,8 @@ pub(super) struct CommandChecker {
     pub(super) paused_at: PerJoint<Instant>,
     /// When a joint last got a goal.
     pub(super) goal_at: PerJoint<Instant>,
-    /// The last goal of a joint whose servo was lost, and its tolerance in counts. A found servo may continue from that
-    /// goal (D12). The tolerance grows when offsets change.
+    /// The last goal of a joint whose servo was lost, and its tolerance in counts. A servo that answers again may continue from
+    /// that goal (D12). The tolerance grows when offsets change.
     kept_goals: PerJoint<Option<(u16, u16)>>,
     /// True until the joint has torque from this controller. Until then its goal may be the goal that its servo holds (D12).
     is_first: PerJoint<bool>,

@@ -34,7 +34,7 @@ const BOOT_TIME: Duration = Duration::from_millis(200);
 const MAX_DELAY: Duration = Duration::from_millis(40);
 /// In counts per second. The controller may reject the readings of a joint that turns faster: its limit is 2,000 (D12).
 const BELIEVED_SPEED: u16 = 1_900;
-/// Kept bytes of an incomplete reply. The longest reply of a servo is shorter.
+/// The largest number of kept bytes of an incomplete reply: one less than the longest complete reply has.
 const MAX_REPLY: usize = 32;
 
 /// Whether a servo replies.
@@ -227,7 +227,7 @@ impl DisturbedBus {
         bytes
     }
 
-    /// Counts corrupted replies with a valid checksum among the received bytes: one corrupted reply in 256.
+    /// Counts the corrupted replies with a valid checksum, one corrupted reply in 256, and records them as possible misreadings.
     fn count_undetected_errors(&mut self, now: Instant, received: &[u8]) {
         for joint in self.comparison.received(received) {
             self.undetected_errors += 1;

@@ -32,7 +32,7 @@ const fn low_byte(at: u8) -> Option<u8> {
     }
 }
 
-/// The reason for which a write is refused because of this byte of a two-byte register, and the address of its low byte
+/// If `at` is a byte of a two-byte register for which the write has to be refused: the reason, and the address of the low byte
 /// (D22). `None` if the register is written whole and its value is in range, or if it is no writable two-byte register.
 pub(crate) fn word_offence(items: &[(u8, u8)], at: u8) -> Option<(u8, u8)> {
     let low = low_byte(at)?;

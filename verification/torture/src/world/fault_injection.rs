@@ -11,7 +11,7 @@ use crate::scenario::InjectedFault;
 
 /// The time between two steps of a hand.
 const HAND_PERIOD: Duration = Duration::from_millis(10);
-/// The largest step of a hand, in thousandths of a count: about 25 degrees/s.
+/// The largest step of a hand, in thousandths of a count. One count per [`HAND_PERIOD`] is 21 to 29 degrees/s.
 const MAX_HAND_STEP: usize = 1_000;
 /// The shortest and the longest time from a hang until the watchdog restarts the controller.
 const WATCHDOG_TIME: [Duration; 2] = [Duration::from_millis(1_000), Duration::from_millis(2_000)];
@@ -155,8 +155,8 @@ impl TortureWorld {
         });
     }
 
-    /// Moves the hand. The hand releases a joint that may be driven, when its time is over, and while the bus is disturbed. A
-    /// silent joint counts as driven only while its servo has torque.
+    /// Moves the hand. The hand releases the joint if the joint may be driven, if the time of the hand is over, or if the bus is
+    /// disturbed. A joint whose servo is reported as missing counts as driven only while its servo has torque.
     pub(super) fn move_hand(&mut self) {
         let Some(hand) = self.hand.as_mut().filter(|hand| hand.next_at <= self.now) else { return };
         let is_driven = match &self.power {

@@ -36,7 +36,7 @@ impl HostToArm {
     /// Transmits bytes after a pause. Returns the arrival time of the last byte.
     pub(super) fn send(&mut self, now: Instant, pause: Duration, bytes: &[u8]) -> Instant {
         self.free_at = self.free_at.max(now) + pause;
-        // One entry per millisecond is enough: the shell does not run more often.
+        // Bytes arrive in batches of a millisecond, so that the simulation has fewer events.
         let batch = usize::try_from(self.baud / 10_000).unwrap_or(1).max(1);
         for part in bytes.chunks(batch) {
             self.free_at = self.free_at + time_of(part.len(), self.baud);

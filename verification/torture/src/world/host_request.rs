@@ -36,7 +36,6 @@ impl HostRequest {
         usize::from(address) + count <= 256
     }
 
-    /// True for a read.
     pub(super) const fn is_read(&self) -> bool {
         matches!(self, Self::Read { .. })
     }

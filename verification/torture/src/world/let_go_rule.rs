@@ -13,8 +13,8 @@ struct Freed {
     /// Its measured position, and its target, in degrees.
     present: u8,
     target: u8,
-    /// True if the target does not follow the position yet: the answer that shows that a servo let go may be newer than the
-    /// target. The next answer moves the target.
+    /// True if the target does not follow the position yet. The answer that shows that the servo let go updates the position,
+    /// but not always the target. The next answer updates the target.
     is_behind: bool,
     /// The number of times that the host has written the target.
     writes: u64,

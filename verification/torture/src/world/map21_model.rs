@@ -97,7 +97,7 @@ fn block<const N: usize>(address: u8, values: &[u8], first: u8) -> Option<[u8; N
     rest.first_chunk().copied()
 }
 
-/// Uses `f32` as the chip does, so that both agree on positions at the limit of the reach.
+/// A position in millimetres. Uses `f32` as the controller does, so that model and controller agree at the limit of the reach.
 fn position([x1, x0, y1, y0, z1, z0]: [u8; 6]) -> Vector<f32> {
     let millimetres = |high, low| f32::from(u16::from_be_bytes([high, low])) - 1024.0;
     Vector::new(millimetres(x1, x0), millimetres(y1, y0), millimetres(z1, z0))

@@ -79,7 +79,7 @@ fn position(rng: &mut SeededRng) -> Vec<u8> {
         let millimetres = usize::from(least) + rng.below(count);
         u16::try_from(millimetres).unwrap_or(least).to_be_bytes()
     };
-    // Plus 1024: x is -200 to 200, y 0 to 300, z 0 to 300.
+    // Millimetres plus 1024: x is -200 to 200, y 0 to 300, z 0 to 300.
     [coordinate(824, 401), coordinate(1_024, 301), coordinate(1_024, 301)].concat()
 }
 

@@ -164,7 +164,7 @@ impl TortureWorld {
         }
     }
 
-    /// True if the controller protects the servos, and knows them.
+    /// True if the controller protects the servos, and has run for so long that it knows their state.
     fn is_guarded(&self) -> bool {
         matches!(&self.power, PowerState::On(arm)
             if arm.model.get(PROTECTION) == 1 && arm.status_checker.is_settled(self.now))

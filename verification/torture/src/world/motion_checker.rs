@@ -87,7 +87,7 @@ impl MotionChecker {
         Joint::ALL.into_iter().for_each(|joint| self.exempt(now, joint, exemption));
     }
 
-    /// All servos lost their power, and the bytes of an incomplete frame.
+    /// Records that all servos lost their power, and with it the bytes of an incomplete frame.
     pub(super) fn power_cycle(&mut self, now: Instant) {
         self.received.clear();
         self.exempt_all(now, Exemption::PowerLoss);
@@ -197,8 +197,8 @@ impl MotionChecker {
 }
 
 /// How far a driven joint may be off its set-point, in millidegrees: by the droop of its own load, and by the distance
-/// in which its motor can stop it. That distance hides no fall: the load of a falling joint is smaller than the torque of
-/// its motor, so the joint falls further.
+/// in which its motor can stop it. This distance hides no fall: the load of a joint is smaller than the stall torque, so a
+/// joint falls farther than the distance in which its motor can stop it.
 fn yield_of(joint: Joint, plant: &Plant) -> i32 {
     let droop = plant.droop(joint).unwrap_or(i32::MAX);
     droop.saturating_add(plant.stopping_distance(joint))

@@ -133,7 +133,7 @@ impl TortureWorld {
         }
     }
 
-    /// Repeats the overload of a servo until its joint may no longer engage (D28). The host only reads meanwhile.
+    /// Forces [`TRIPS`] more overloads on a servo, so that its joint may no longer engage (D28). The host only reads meanwhile.
     fn trip_again_and_again(&mut self, joint: Joint) {
         let mut at = self.now;
         for _ in 0..TRIPS {

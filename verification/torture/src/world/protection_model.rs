@@ -11,7 +11,7 @@ pub(super) const PUSH_LIMIT: u8 = 193;
 pub(super) const GRIP_LIMIT: u8 = 194;
 /// Joints that are let go, bit n-1 = joint n (D28).
 pub(super) const LET_GO: u8 = 196;
-/// 1: the arm entered state 0 by itself (D29).
+/// 1: the arm entered state 0 because the supply of its servos was lost (D29).
 pub(super) const SUPPLY_LOST: u8 = 198;
 
 /// The limit of a joint's push in 0.1 % of the stall torque; `None` without protection (D27).

@@ -27,7 +27,7 @@ const OPTIONS: u8 = 20;
 /// The report frequencies of map 2.1 (M4).
 const ANGLE_FREQUENCY: u8 = 82;
 const LOAD_FREQUENCY: u8 = 90;
-/// The bytes of an alarm.
+/// The length of an alarm frame in bytes.
 const ALARM_LENGTH: usize = 7;
 /// The first address of the EEPROM region, and the first after it.
 const EEPROM: (u8, u8) = (8, 28);
@@ -53,7 +53,8 @@ pub(crate) struct RegisterModel {
     storage: Storage,
     accepted: u16,
     refused: u16,
-    /// True if the host's last target is in force: no release, loss of the servo or correction by the arm followed it.
+    /// True if the host's last target is in force: since the host wrote it, the joint was not released, its servo was not lost,
+    /// and the arm did not replace the target.
     pub(crate) has_host_target: PerJoint<bool>,
     /// Offsets are shown as 128 + offset (M5). `values` has them in sign and magnitude.
     has_biased_offsets: bool,
@@ -68,8 +69,8 @@ pub(crate) struct RegisterModel {
     pub(crate) held_targets: PerJoint<Option<u8>>,
     /// The targets that the arm may have set itself (D27, D28).
     pub(crate) own_targets: PerJoint<OwnTarget>,
-    /// The outcome of the next write, if it is known from the arm's registers: the register that the refusal names, or
-    /// `Some(None)` if the limits allow the write.
+    /// The outcome of the next write under the limits, if the arm's registers tell it: `Some(Some(register))` for a refusal that
+    /// names this register, `Some(None)` if the limits allow the write.
     pub(crate) told: Option<Option<u8>>,
     /// The possible outcomes of the last request under the limits.
     outcomes: Vec<Option<u8>>,
@@ -205,7 +206,7 @@ impl RegisterModel {
         })
     }
 
-    /// The reason for which a write is refused, and the register (D16, D22).
+    /// The reason why a write has to be refused, and the register that the refusal names (D16, D22).
     fn first_offence(&self, items: &[(u8, u8)]) -> Option<(u8, u8)> {
         items.iter().find_map(|&(at, value)| {
             let is_wrong = self.row(at).is_some_and(|row| !row.range.contains(u16::from(value)));

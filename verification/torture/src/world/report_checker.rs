@@ -108,7 +108,7 @@ impl ReportCount {
 }
 
 /// Limits the frequencies to the capacity of the line, in reports a second: `most_positions` for register 53, and `most` for
-/// the two streams of map 2.1 together. These share it in their ratio, at least 1 Hz each.
+/// the two streams of map 2.1 together. The two share `most` in the ratio of their frequencies, at least 1 Hz each.
 fn limited([positions, angles, loads]: [u32; 3], [most_positions, most]: [u32; 2]) -> [u32; 3] {
     let sum = angles + loads;
     let share = |wanted: u32| match (wanted * most).checked_div(sum) {

@@ -26,8 +26,9 @@ impl PoweredArm {
 }
 
 impl TortureWorld {
-    /// Applies the next `count` requests to the model. `room` is the room of the link, in bytes. The effect of the last one
-    /// is owed from then on; frames to the servos may come before it. Compares the model with the arm's registers.
+    /// Applies the next `count` requests to the model. `room` is the free space of the link, in bytes. `owed` then holds
+    /// the effect of the last request; frames to the servos may come before its output. Compares the model with the arm's
+    /// registers.
     pub(super) fn apply_requests(&mut self, arm: &mut PoweredArm, count: u16, room: usize) -> Check {
         self.record_missing(arm);
         self.record_lost_supply(arm)?;

@@ -132,7 +132,8 @@ impl<const SECTOR: usize> FlashSettings<SECTOR> {
         self.flash.0.borrow().flash.is_powered()
     }
 
-    /// Checks that a good flash is not broken, and that the sectors of the board are not full before [`MIN_SAVES`] saves.
+    /// Checks that the storage on a flash without wear is not broken, and that the sectors of the board are not full before
+    /// [`MIN_SAVES`] saves.
     fn check_storage(&self, storage: Storage) -> Check {
         let early = storage == Storage::Full && SECTOR == BOARD_SECTOR && self.saves < MIN_SAVES;
         ensure(self.is_worn || storage != Storage::Broken && !early, || {

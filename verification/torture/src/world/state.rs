@@ -42,7 +42,7 @@ pub struct TortureWorld {
     pub(super) stalled_until: Instant,
     pub(super) next_fault_at: Instant,
     pub(super) hand: Option<Hand>,
-    /// The later events of obstacles, pushes and faults from outside, each with its time.
+    /// The pending ends and repetitions of influences from outside the arm, each with its time.
     pub(super) endings: Vec<(Instant, Ending)>,
     pub(super) supply_rule: SupplyRule,
     pub(super) log: EventLog,
@@ -57,7 +57,7 @@ pub(super) enum PowerState {
         until: Instant,
         servos_too: bool,
     },
-    /// A step has taken the powered arm out and puts it back at its end.
+    /// A step of the simulation has taken the powered arm out. At the end of the step the state is `On` or `Off` again.
     Taken,
 }
 

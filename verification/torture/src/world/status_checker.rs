@@ -45,7 +45,7 @@ pub(super) struct StatusChecker {
     last_moves: PerJoint<(u16, Instant)>,
     /// When the position of each joint was checked last.
     position_checked_at: PerJoint<Instant>,
-    /// The last time at which a joint that is let go had no latched overload.
+    /// The last time at which each joint was not let go, or had no latched overload.
     unlatched_at: PerJoint<Instant>,
     missing: u8,
     corrupted: u16,
@@ -88,7 +88,7 @@ impl StatusChecker {
         now - self.unsettled_at > DETECTION_TIME
     }
 
-    /// The shell stalls until `now`, for a time of `by`.
+    /// The shell stalls for the time `by`, which ends at `now`.
     pub(super) fn shell_was_late(&mut self, now: Instant, by: Duration) {
         self.unsettled_at = now;
         self.reports.disturb();

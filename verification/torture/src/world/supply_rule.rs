@@ -36,7 +36,7 @@ impl SupplyRule {
         *self = Self::default();
     }
 
-    /// Checks the arm. Returns whether it had to be in state 0.
+    /// Checks that the arm entered state 0 if it had to. Returns whether it had to.
     pub(super) fn check(&mut self, now: Instant, registers: &RegisterFile) -> Check<bool> {
         let is_due = self.due.is_some_and(|due| now >= due);
         ensure(!is_due || registers.get(SUPPLY_LOST) == 1, || {

@@ -14,7 +14,7 @@ const END_OF_TIME_US: u64 = 1 << 62;
 pub struct ControllerLoop {
     pub controller: Controller,
     pub replies: ScriptedReplies,
-    /// The room of the host link in bytes.
+    /// The free space of the host link in bytes.
     pub room: usize,
     pub next_save: Storage,
     now_us: u64,

@@ -40,7 +40,8 @@ pub struct InvariantChecker {
     calls: u32,
     joints: [JointGoal; 7],
     is_driven: [bool; 7],
-    /// The time of the first wait in a motor state other than servo, in microseconds; `None` in servo and after a torque-on.
+    /// The time of the first wait in a motor state other than servo, in microseconds; `None` in servo, and after a torque command
+    /// that leaves a joint driven.
     released_at: Option<u64>,
     valve_opened_at: Option<u64>,
     vacuum: Vacuum,

@@ -1,4 +1,5 @@
-//! Scripted replies in place of seven servos: each position is the last goal. There is no time and no motion.
+//! Scripted replies in place of seven servos: each position is the last goal, or the one that a hand step set. There is no time
+//! and no motion.
 
 use motion_core::servo_bus::frame::{Decoder, Instruction, Reading, ServoFrameBuffer, register, status};
 
@@ -8,7 +9,8 @@ const MOST_FROM_POSITION: u8 = 11;
 /// A decoded command. Servo numbers start at 0.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum ServoCommand {
-    /// A read: the servo and the number of registers. Up to 11 registers start at the position, more at the torque switch.
+    /// A read: the servo and the number of registers. A read of up to 11 registers starts at the position,
+    /// a longer one at the torque switch.
     Read(u8, u8),
     /// The torque code for each servo in the frame.
     Torque([Option<u8>; 7]),

@@ -1,5 +1,5 @@
-//! Checks that goals are within reach of the last ones, end at the target and keep the linkage. A servo without
-//! torque gets a goal only at its position, and after a silence only once its torque was read (D10, D12, D25, D27, D29).
+//! Checks that goals are within reach of the last ones, end at the target and keep the linkage. A servo without torque gets a
+//! goal only at its position. After a silence, a servo gets a goal only once its torque was read (D10, D12, D25, D27, D29).
 
 use protocol_core::registers::Joint;
 use protocol_core::registers::map::{

@@ -1,4 +1,4 @@
-//! Checks that the arm reports a lost supply only after a loss (D29).
+//! Checks when the arm may report a lost supply (D29).
 
 use protocol_core::registers::Joint;
 use protocol_core::time::{Duration, Instant};

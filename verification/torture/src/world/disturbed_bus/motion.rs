@@ -9,7 +9,8 @@ use crate::violation::Check;
 use crate::world::motion_checker::Exemption;
 use crate::world::push_rule::Push;
 
-/// Half of 5 ms. With servo timeouts of up to 5 ms, the responding servos are read often enough while others are silent.
+/// The `timely_limit` of a servo timeout of 5 ms, which is half of it. With timeouts of up to 5 ms, the responding servos are
+/// read often enough while others are silent.
 const SHORT: Duration = Duration::from_micros(2_500);
 
 impl DisturbedBus {

@@ -92,7 +92,7 @@ impl DisturbedBus {
         match self.faults[joint] {
             _ if self.is_stopped => silent,
             Some(ServoFault::Missing | ServoFault::Garbled(1)) => silent,
-            // After a restart, the controller may take an old reply for the reply to its next read, and so on.
+            // After a restart, the controller may take each late reply for the reply to its next read.
             Some(ServoFault::Late(_)) if self.restarted_at > since => Availability::Uncertain,
             Some(ServoFault::Late(by)) if by >= self.late_limit => silent,
             Some(ServoFault::Late(by)) if by > self.timely_limit => Availability::Uncertain,

@@ -5,7 +5,7 @@ use protocol_core::time::Instant;
 /// The accepted distance of a joint from its range, in millidegrees, without load and speed. A goal is a multiple of a count,
 /// which is up to 0.29 degrees, and the angle is measured after the goal is computed.
 const TOLERANCE: i32 = 450;
-/// A servo with this load, in 0.1 %, drives its joint back.
+/// A servo with more than this load towards the range, in 0.1 %, drives its joint back.
 const DRIVES_BACK: i16 = 100;
 
 /// Why a joint may move without a goal.

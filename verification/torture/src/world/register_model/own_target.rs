@@ -1,12 +1,12 @@
 //! The targets that the arm may set itself (D27, D28).
 
-/// The values to which the arm may have set a target, beside the measured position.
+/// The values that a target of the arm may have although the model has another one, beside the measured position.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum OwnTarget {
     /// The measured position alone.
     Measured,
     /// The joint may be let go: its target follows the measured position, and a point of a stream is not taken (D28). The
-    /// value is the target before.
+    /// target may still be the one before, which is this value in degrees.
     Before(u8),
     /// The joint may have given way to an obstacle: the target is its set-point, between `low` and `high` degrees (D27), or
     /// still the target before.

@@ -8,7 +8,8 @@ use crate::world::disturbed_bus::{Availability, DisturbedBus};
 use crate::world::register_model::RegisterModel;
 use crate::world::watchdog_model::WatchdogModel;
 
-/// A joint may be late for this long after it got no goal, for example because its servo left reads unanswered.
+/// A joint may be late for this long after a frame of goals without one for it, for example because its servo left reads
+/// unanswered.
 const PAUSE: Duration = Duration::from_millis(1_000);
 /// A joint that is driven gets a goal in each control cycle, or after each timeout on a bus with long timeouts.
 const GOAL_PERIOD: Duration = Duration::from_millis(100);
