@@ -176,7 +176,7 @@ pub(crate) fn approach(py: Python<'_>, seconds: Option<f64>) -> PyResult<Approac
     }
 }
 
-/// The registers of a stream: period and watchdog in seconds; with `damping` the watchdog lets the arm sink.
+/// The options of a stream. `period` and `watchdog` are seconds; with `damping` the watchdog lets the arm sink.
 pub(crate) fn stream(py: Python<'_>, period: f64, watchdog: f64, damping: bool) -> PyResult<StreamOptions> {
     let milliseconds = Some(period).filter(|period| (0.005..=1.0).contains(period));
     let options = milliseconds.map(|period| steps(period * 1_000.0)).and_then(StreamOptions::new);
@@ -196,7 +196,7 @@ fn steps(number: f64) -> u16 {
     number.round() as u16
 }
 
-/// How a port is opened, as the arguments tell.
+/// The arguments that say how a port is opened.
 #[derive(Clone, Copy)]
 pub(crate) struct OpenArguments<'a> {
     pub(crate) baud: i64,

@@ -339,7 +339,7 @@ impl Arm {
     fn __exit__(&self, py: Python<'_>, exception: &Bound<'_, PyTuple>) -> PyResult<bool> {
         let failed = exception.get_item(0).is_ok_and(|kind| !kind.is_none());
         match self.hold_and_close(py) {
-            // Python then raises the exception of the `with` block, which is the cause of this failure.
+            // Python then raises the exception of the `with` block instead of this failure.
             Err(_) if failed => Ok(false),
             other => other.map(|()| false),
         }

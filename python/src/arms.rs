@@ -26,7 +26,7 @@ use crate::worker::lock;
 const GRAMS: std::ops::RangeInclusive<f64> = 0.0..=HEAVIEST_LOAD_G as f64;
 /// The most arms.
 const MOST_ARMS: i64 = 1_000_000;
-/// About the memory of an arm in bytes.
+/// The approximate memory of an arm, in bytes.
 const ARM_BYTES: usize = 20_000;
 
 /// Simulated arms that step together, for learning: `seen = arms.step(actions, 0.02)`, with an action of seven angles in degrees

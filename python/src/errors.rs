@@ -61,7 +61,7 @@ pub(crate) fn warn_of(py: Python<'_>, breach: &dyn Display) -> PyResult<()> {
 }
 
 impl NotServed {
-    /// The exception of an arm whose firmware does not have this.
+    /// The exception of an arm whose firmware does not have `what`.
     pub(crate) fn of_arm(py: Python<'_>, what: &str) -> PyErr {
         error::<Self>(py, &format!("the arm's firmware does not have {what}"), &[])
     }

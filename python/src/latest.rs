@@ -1,4 +1,5 @@
-//! Passes the actions of a program that does not wait to the thread of the port, and its counts and failures back.
+//! Passes the actions of a program that does not wait to the thread of the port, and passes the counts and failures of this
+//! thread back.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -34,7 +35,7 @@ impl Slot {
 /// The answer to a program that offers an action.
 pub(crate) struct Told {
     pub(crate) counts: LatestCounts,
-    /// Where the actions so far lead, in degrees.
+    /// The last angle of each joint in the actions so far, in degrees.
     pub(crate) pose: [f64; 7],
 }
 

@@ -65,7 +65,8 @@ impl PacedStream<'_> {
         self.has_failed |= done.as_ref().is_err_and(is_of_arm);
     }
 
-    /// After `Arm.stop` nothing is sent until the program has received `Interrupted`.
+    /// Fails with `Interrupted` if `Arm.stop` was called while the sender leads the arm, and drops the waiting action. Nothing is
+    /// sent until the program has received this error.
     fn notice_stops(&mut self) -> Result<(), MoveError> {
         let stops = self.stops.load(Ordering::Relaxed);
         let is_stopped = std::mem::replace(&mut self.stops_before, stops) != stops;

@@ -123,7 +123,7 @@ pub(crate) fn straight_line(
     Ok(StraightLine::plan(&StraightLineRequest { guard, ..line })?.recording)
 }
 
-/// The speed of the tip, in mm/s, that takes it there in this time; the lowest speed if only the tool turns.
+/// The speed, in mm/s, that takes the tip from `start` to `tip` in `seconds`; the lowest speed if only the tool turns.
 fn speed_within(start: LineStart, tip: Vector, seconds: f64) -> Result<f64, StraightMoveError> {
     let from = TipPose::of_fine(start.targets).tip;
     let length = (tip.x - from.x).hypot(tip.y - from.y).hypot(tip.z - from.z);
@@ -215,7 +215,7 @@ pub(crate) struct Recorded {
     pub(crate) arrivals: Vec<f64>,
 }
 
-/// Records until the time is over or a signal of Python ends it. A failure leaves what was recorded before it.
+/// Records until the time is over or a signal of Python ends it. Also returns what was recorded before a failure.
 pub(crate) fn record(
     arm: &mut Arm,
     options: RecordOptions,

@@ -17,7 +17,7 @@ pub(crate) struct ProgressLine {
 }
 
 impl ProgressLine {
-    /// Shows how much of a call is done. `total` is 0 while it is unknown. Is called each 50 ms.
+    /// Shows how much of a call is done. `total` is 0 while it is unknown. The caller calls this each 50 ms.
     pub(crate) fn show(&mut self, done: u64, total: u64) {
         self.calls = self.calls.saturating_add(1);
         if total == 0 || self.calls < DELAY_CALLS {

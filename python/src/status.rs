@@ -238,7 +238,7 @@ impl Status {
     }
 }
 
-/// The numbers of joints. A vector of bytes would be `bytes` in Python.
+/// The numbers of the joints in `bits`. They are `u16`, because Python would get a vector of `u8` as `bytes`.
 fn numbers(bits: u8) -> Vec<u16> {
     Joint::ALL.iter().filter(|joint| bits & joint.bit() != 0).map(|joint| u16::from(joint.number())).collect()
 }

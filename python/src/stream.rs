@@ -87,8 +87,8 @@ impl Drop for Stream {
 }
 
 impl PacedStream<'_> {
-    /// Waits until the joints stand at their last points. After a failure of the whole arm they do not get there: then it returns
-    /// only a failure that the program has not received yet.
+    /// Waits until the joints stand at their last points. After a failure of the whole arm they do not get there: then this
+    /// function does not wait for them, and returns only a failure that the program has not received yet.
     fn arrive(&mut self, watch: &mut Watch<'_>) -> Result<(), MoveError> {
         self.finish_leading(watch)?;
         if self.has_failed {
@@ -100,8 +100,8 @@ impl PacedStream<'_> {
         self.stream.wait_until_arrived(|stream, end| stream.wait_until(end, watch))
     }
 
-    /// Begins the stream again after a restore and after a failure of the whole arm. The arm may be elsewhere then, and may have
-    /// lost the registers of the stream.
+    /// Begins the stream again after a restore of the simulation and after a failure of the whole arm. The arm may be elsewhere
+    /// then, and may have lost the registers of the stream.
     pub(crate) fn begin_again_if_lost(&mut self) -> Result<(), StreamError> {
         let restores = self.simulation.as_ref().map_or(0, SharedSimulation::restores);
         if self.restores != restores || self.has_failed {

@@ -15,7 +15,7 @@ use sevenbot::stream::{LatestPoints, SetPointStream, StreamError, StreamOptions,
 
 use crate::latest::LatestSlot;
 
-/// The longest time that a read of another thread waits for an arm that moves.
+/// While a call waits for joints, it serves the reads of other threads at least this often.
 const BETWEEN_READS: Duration = Duration::from_millis(20);
 
 /// The order of Python to open a stream.
@@ -112,10 +112,10 @@ pub(crate) enum Message {
 /// What the two threads of a call share.
 #[derive(Debug, Default)]
 pub(crate) struct CallState {
-    /// Has the thread of the port begun the call, or has its caller left before?
+    /// True once the thread of the port has begun the call, or the caller has left before that.
     is_claimed: AtomicBool,
     is_interrupted: AtomicBool,
-    /// The number of stops so far, and that at the start of the call.
+    /// The number of stops so far, and the number of stops at the start of the call.
     stops: Arc<AtomicU64>,
     stops_before: u64,
     done: AtomicU64,
@@ -129,8 +129,8 @@ impl CallState {
         Self { stops: Arc::clone(stops), stops_before, ..Self::default() }
     }
 
-    /// Claims the call, for the thread of the port to run it, or for the caller to leave before it runs. The first of them gets
-    /// `true`.
+    /// Claims the call, for the thread of the port to run it, or for the caller to leave before it runs. True for the first of
+    /// the two.
     pub(crate) fn claim(&self) -> bool {
         !self.is_claimed.swap(true, Ordering::Relaxed)
     }
@@ -140,7 +140,7 @@ impl CallState {
         self.is_interrupted.store(true, Ordering::Relaxed);
     }
 
-    /// The work done so far, and all of it.
+    /// The work done so far, and the total work; 0 while the total is unknown.
     pub(crate) fn progress(&self) -> (u64, u64) {
         (self.done.load(Ordering::Relaxed), self.total.load(Ordering::Relaxed))
     }

@@ -28,7 +28,7 @@ TOLERANCE = 0.5
 ENOUGH = 120.0
 #: The reply timeout in seconds. On a busy machine an answer of the emulator may take longer than the default timeout.
 ANSWER_TIME = 20.0
-#: What happens on a machine that is too busy for an emulator: the arm stops on its way, or the answers of servos are late.
+#: Parts of the errors on a machine that is too busy for an emulator: the arm stopped on its way, or a servo answered late.
 BUSY = ("this program paused", "does not answer", "no servo answers")
 
 

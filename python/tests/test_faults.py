@@ -22,13 +22,13 @@ import sevenbot
 SNAPSHOT = Path(__file__).with_name("faults.txt")
 REST = (90, 90, 65, 90, 90, 90, 80)
 GOAL = (110, 105, 65, 90, 90, 90, 80)
-#: A joint has reached an angle if it is within this many degrees: servos have play, and the arm bends.
+#: A joint has reached an angle if it is within this many degrees of it: servos have play, and the arm bends.
 NEAR = 3.0
-#: A joint that moves by less than this in `AFTERWARDS` stands still, in degrees.
+#: A joint that moves by at most this many degrees in `AFTERWARDS` stands still.
 STILL = 1.5
 #: Seconds after the end of a method, in which the arm completes the move that the method began.
 AFTERWARDS = 3.0
-#: The arm has received this many frames before. A method detects a restart by the counter of frames.
+#: The number of frames that the arm receives before the call. A method detects a restart by the counter of frames.
 USED = 100
 
 #: The messages for a supply that is lost and comes back. Which one appears depends on when the method reads the arm.

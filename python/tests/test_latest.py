@@ -46,7 +46,7 @@ def test_the_newest_action_is_sent_and_the_others_are_skipped(simulated_arm: sev
         assert simulated_arm.simulation.now == before, "it does not wait"
         assert stream.counts.skipped == 49
         simulated_arm.sleep(0.1)
-        # Joints without an angle keep that of the action before.
+        # A joint without an angle keeps its angle of the action before.
         stream.latest([None, 91, *[None] * 5])
         stream.latest([95.5, *[None] * 6])
     assert simulated_arm.get("fine-target") == [9550, 9100, 6500, 9000, 9000, 9000, 8000]

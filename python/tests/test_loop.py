@@ -27,7 +27,7 @@ def turns_on_time(damaged_percent: float, seed: int) -> int:
             while last < TURNS - 1:
                 observed = arm.observe()
                 assert not numpy.isnan(observed.positions).any()
-                # A turn that is late passes over numbers.
+                # After a late turn, the number of the point grows by more than one.
                 last = stream.send([90 + math.sin(last / 50), *REST[1:]])
                 made += 1
             arm.simulation.clear()

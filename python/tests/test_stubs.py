@@ -29,7 +29,7 @@ def docstring(found: object, indent: str) -> str | None:
 
 
 def is_own(node: Place) -> bool:
-    """Methods of Python, such as `__len__`, need no words."""
+    """True without a leading underscore: methods such as `__len__` need no docstring."""
     return not node.name.startswith("_")
 
 

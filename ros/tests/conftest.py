@@ -97,12 +97,12 @@ class Start:
         return emulator
 
     def arm(self, kind: str) -> Program:
-        """A controller behind the link: "simulator", or the "image" in an emulator, which runs in the time of the computer."""
+        """A controller behind the link: "simulator", or the "image" in an emulator, which runs in real time."""
         return self.emulator() if kind == "image" else self.simulator()
 
     @property
     def link(self) -> str:
-        """The port of the simulator."""
+        """The port of the simulator or of the emulator."""
         return str(self._folder / "arm")
 
 

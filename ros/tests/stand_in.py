@@ -103,7 +103,7 @@ class StandIn:
     """Reads and writes `Fibonacci` as if it were FollowJointTrajectory."""
 
     def goal(self, request: Any) -> Goal:
-        # Half a radian: a joint that leaves the path fails the goal.
+        # The path tolerance is 0.5 rad: a joint that is further away fails the goal.
         trajectory = TRAJECTORIES[request.order]()
         return Goal(trajectory, {name: 0.5 for name in trajectory.joint_names}, {}, 0.0)
 

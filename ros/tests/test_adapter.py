@@ -52,7 +52,7 @@ def test_a_goal_is_read() -> None:
         goal_time_tolerance=Duration(sec=1, nanosec=500_000_000),
     )
     goal = PublishedAdapter(Action()).goal(request)
-    # 0 is the default of the server, and a negative number is no limit.
+    # 0 selects the default of the server, and a negative number means no limit.
     assert goal.path_tolerance == {"joint_1": 0.1, "joint_2": math.inf} and goal.goal_tolerance == {}
     assert goal.goal_time == 1.5 and goal.trajectory.joint_names == ["joint_1"]
 

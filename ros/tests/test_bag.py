@@ -21,7 +21,7 @@ def test_a_bag_opens_with_rosbags_and_rerun(start: Start, client: Callable[..., 
     recorder = start.program([sys.executable, "-m", "sevenbot_ros.bag", str(folder)])
     leading = client(simulated_time=True)
     leading.connect()
-    # The node and the recorder hear the commands.
+    # Both the node and the recorder receive the commands.
     leading.until(lambda: leading.commands.get_subscription_count() == 2, "the recorder")
     leading.each(0.02, 50, lambda index: leading.send({"joint_1": 0.1 * index}))
     leading.until(lambda: leading.degrees()[0] > 3.0 and len(leading.states) > 100, "motion")

@@ -106,7 +106,7 @@ def test_nothing_moves_after_a_stop_without_a_hold() -> None:
 
 @pytest.mark.parametrize("move", [actions.home, actions.park])
 def test_a_stop_between_the_check_and_the_motion_ends_the_motion(start: Start, move: Callable[[Driver], str]) -> None:
-    # In real time: in the time of a simulated arm of this process a motion ends at once.
+    # Use a simulator in real time: with a simulated arm in this process, a motion ends at once.
     start.simulator()
     with running(start.link) as (driver, heard):
         with driver.action() as arm:

@@ -86,7 +86,7 @@ def test_what_a_client_sees(start: Start, client: Clients) -> None:
     assert tip.pose.orientation.w == pytest.approx(1.0, abs=0.01)
     assert "<param name=\"joint_commands_topic\">/robot_joint_command</param>" in hearing.descriptions[-1]
     assert level(hearing) == (0, "healthy")
-    # The clock of the simulated arm is that of the client.
+    # The client uses the clock of the simulated arm.
     assert abs(hearing.seconds() - seconds_of(hearing.states[-1])) < 1.0
 
 

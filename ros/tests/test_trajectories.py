@@ -159,7 +159,7 @@ def test_the_topic_interface_of_ros2_control(start: Start, client: Clients, repo
     leading.connect()
     leading.each(0.02, 25, lambda _: leading.send([math.nan] * 7))
     leading.until(lambda: "is a controller active?" in node.text(), "a warning")
-    # A controller that becomes active holds what was measured.
+    # A controller that becomes active holds the measured positions.
     standing = leading.degrees()
     leading.each(0.02, 10, lambda _: leading.send(standing))
 

@@ -18,7 +18,7 @@ use crate::wait::{TIMEOUT, wait_for};
 pub struct RunningProgram {
     /// `None` after its end.
     child: Option<Child>,
-    /// Has the program processes of its own, which it ends when it is terminated?
+    /// True if the program starts processes of its own, and ends them when it is terminated.
     has_processes: bool,
 }
 

@@ -65,8 +65,8 @@ pub struct RelayPlan {
     pub moment: Moment,
     /// The action.
     pub action: Box<dyn FnMut() -> LineAction + Send>,
-    /// Is the checksum of every 9th request, every 9th report and every 7th other frame of the arm made wrong? Then of three
-    /// tries of a read in a row, at least one succeeds.
+    /// If true, the relay makes the checksum of every 9th request, every 9th report and every 7th other frame of the arm wrong.
+    /// These numbers let at least one of three successive tries of a read succeed.
     pub is_noisy: bool,
 }
 
@@ -272,7 +272,7 @@ fn pass_on(arm: &OwnedFd, frame: &[u8]) {
     }
 }
 
-/// Makes the checksum of each Nth frame wrong.
+/// Makes the checksum of a frame wrong if `number` is a multiple of `each`.
 fn disturb(frame: &mut [u8], number: u32, each: u32) {
     if let Some(last) = frame.last_mut()
         && number.is_multiple_of(each)

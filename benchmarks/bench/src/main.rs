@@ -1,7 +1,7 @@
 //! `cargo xtask bench`: the time per request of the parse-and-reply path, and of four peers: two Modbus RTU servers, postcard
 //! with COBS, and MAVLink.
 //!
-//! All servers get the same operations, as one stream in pieces of 64 bytes that are independent of frame limits.
+//! All servers get the same operations, as one stream in pieces of 64 bytes, without regard to frame boundaries.
 //! They append their replies to one vector. Each reply to undamaged traffic is compared, byte by byte, with an
 //! independent model. Our replies to damaged traffic are compared too. The rounds of the servers are interleaved, so
 //! that other load on the machine affects all alike. Each round begins with a fresh server, and the median of the
@@ -9,8 +9,8 @@
 //!
 //! The rule of the comparison is equal payload bytes:
 //! * A read of 7 returns the same 7 bytes in every protocol, and a write of 7 stores the same 7 bytes.
-//! * A Modbus register holds two bytes, so Modbus reads and writes whole registers: 4 of them, 8 bytes, for 7, and 31 of
-//!   them, 62 bytes, for 61. The rounding costs the Modbus servers one byte in each request.
+//! * A Modbus register holds two bytes, so Modbus reads and writes whole registers: 4 registers (8 bytes) instead of 7 bytes,
+//!   and 31 registers (62 bytes) instead of 61. The rounding costs the Modbus servers one byte in each operation.
 //!
 //! All servers do this work:
 //! * find the frames in the stream, and check a CRC-16 over each;

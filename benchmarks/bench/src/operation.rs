@@ -11,17 +11,14 @@ pub(crate) struct RegisterOperation {
 }
 
 impl RegisterOperation {
-    /// A read of `count` bytes.
     pub(crate) const fn read(first: u8, count: u8) -> Self {
         Self { first, count, written: Vec::new() }
     }
 
-    /// A write of these values.
     pub(crate) fn write(first: u8, written: Vec<u8>) -> Self {
         Self { first, count: u8::try_from(written.len()).unwrap_or(u8::MAX), written }
     }
 
-    /// True for a read.
     pub(crate) const fn is_read(&self) -> bool {
         self.written.is_empty()
     }

@@ -234,7 +234,7 @@ def test_a_disconnect_parks_or_holds(now: Clock, monkeypatch: pytest.MonkeyPatch
         robot = follower(park_on_disconnect=park)
         run(robot, now, [[100 + 0.5 * step, *HOME[1:]] for step in range(20)])
         connected = arm(robot)
-        # The arm is asked before it is closed.
+        # Read the motor state before the arm is closed.
         with monkeypatch.context() as patch:
             states: list[str] = []
             close = type(connected).close

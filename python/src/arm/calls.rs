@@ -101,8 +101,8 @@ impl Arm {
         Ok(raised(py, parked)?.map_err(|why| file_error(py, &path, &why))?.into())
     }
 
-    /// Records until the time is over, or Ctrl-C ends a recording without a limit. Another failure gets the moments before it as
-    /// its attribute `recording`.
+    /// Records until the time is over, or Ctrl-C ends a recording without a limit. Any other failure has the moments that were
+    /// recorded before it in its attribute `recording`.
     pub(super) fn record_moments(&self, py: Python<'_>, options: RecordOptions) -> PyResult<Recording> {
         let work = move |arm: &mut sevenbot::Arm, watch: &mut Watch<'_>| motion::record(arm, options, watch);
         let ((Recorded { text, arrivals }, outcome), signal) = self.worker.call_until_signal(py, work)?;

@@ -1,4 +1,4 @@
-//! Exceptions of this package that are one of Python's own, too: `except ValueError` and `except sevenbot.Error` both work.
+//! Exceptions of this package that are also exceptions of Python: `except ValueError` and `except sevenbot.Error` both work.
 
 use std::io;
 

@@ -43,7 +43,7 @@ impl Raise for sevenbot::Error {
     }
 }
 
-/// A hint of the command line, with the arguments of this package.
+/// Replaces the options of the command line in a hint with the arguments of this package.
 fn in_python(hint: &str) -> String {
     hint.replace("(--baud)", "(baud=)").replace("SEVENBOT_TOKEN set", "SEVENBOT_TOKEN or token= set")
 }
@@ -76,7 +76,7 @@ impl Raise for WriteError {
     }
 }
 
-/// Problems that end a move, with the joints and what to do.
+/// The exception for problems that end a move, with their joints and what to do.
 fn arm_problem(py: Python<'_>, problems: &[sevenbot::Problem]) -> PyErr {
     let hints: Vec<String> = remedies(problems).into_iter().map(str::to_owned).collect();
     let raised = error::<ArmProblem>(py, &sentences(problems), &hints);

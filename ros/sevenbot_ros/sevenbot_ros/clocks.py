@@ -38,7 +38,7 @@ class RealClock:
 class SimulatedClock:
     """Virtual time, led so that it passes `factor` times as fast as real time.
 
-    Virtual time passes by itself while the arm is asked. If a busy machine delays it by more than `LEAP`, it does not catch up.
+    Virtual time also passes while a request waits for its reply. If it falls behind by more than `LEAP`, it does not catch up.
     """
 
     def __init__(self, arm: sevenbot.SimulatedArm, factor: float = 1.0) -> None:

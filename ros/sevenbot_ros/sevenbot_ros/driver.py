@@ -36,7 +36,7 @@ class Driver:
         self.interlock = Interlock()
         self.leads = LeadSlot(settings, self.interlock)
         self.streamer = Streamer(settings, self.interlock, self.leads, events)
-        # Did the thread end by an error of this program?
+        # True if the thread ended although the node was not closing.
         self.has_failed = False
         self._events = events
         self._clock: Clock = RealClock()

@@ -11,7 +11,10 @@ from sevenbot_ros.health import Health
 
 @dataclass(frozen=True)
 class Measurement:
-    """Degrees of the arm, degrees per second, percent of the stall torque, the greatest age, and the time of the arm's clock."""
+    """Positions in degrees of the arm, velocities in degrees per second, and loads in percent of the stall torque.
+
+    `age` is the longest time since the servos were read, `time` the time on the arm's clock. Both are seconds.
+    """
 
     positions: tuple[float, ...]
     velocities: tuple[float, ...]

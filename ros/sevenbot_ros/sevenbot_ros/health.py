@@ -46,7 +46,7 @@ def lost(reason: str) -> Health:
 
 
 def of_registers(motor: Sequence[int], protection: Sequence[int], status: Sequence[int], errors_before: int) -> Health:
-    """The health of the blocks of `BLOCKS`. `errors_before` is the count of bus errors some time ago."""
+    """The health of the blocks of `BLOCKS`. `errors_before` is the count of bus errors at the previous diagnosis."""
     blocked, let_go, missing = joints_of(protection[3]), joints_of(protection[4]), joints_of(status[2])
     alarms, supply_lost = protection[5], bool(protection[6])
     errors, volts, celsius = bus_errors(status), status[10] / 10, status[11]

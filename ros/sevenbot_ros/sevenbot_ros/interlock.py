@@ -28,7 +28,7 @@ class Interlock:
         # Why commands are refused until `hold`, and how often the arm was stopped.
         self._halted: str | None = None
         self._stop_count = 0
-        # Services that use the arm, those of them that move it, and stops that still watch whether it holds.
+        # The numbers of services that use the arm, of services that move it, and of stops that still watch whether it holds.
         self._actions = self._motions = self._stops = 0
 
     def connect(self, arm: sevenbot.Arm | None) -> None:
@@ -70,7 +70,7 @@ class Interlock:
             self._halted = reason
 
     def halt_first(self, reason: str) -> bool:
-        """As `halt`, unless there is a reason already. Tells whether this is the reason."""
+        """As `halt`, unless there is a reason already. Returns whether it has set the reason."""
         with self.lock:
             if self._halted is not None:
                 return False

@@ -17,10 +17,11 @@ from sevenbot_ros.joints import NAMES
 from sevenbot_ros.settings import Settings
 from sevenbot_ros.trajectory import Trajectory
 
-# A joint reaches a point two periods and a cycle of the controller after it was sent, and its measurement is as old as a cycle.
+# From the sending of a point to a measurement of the joint there: two periods, a cycle of the controller (10 ms), and the age of
+# the measurement (a cycle). `LAG` is the two cycles, in seconds.
 LAG_PERIODS = 2
 LAG = 0.02
-# Commands that come while the stream opens, which takes about a tenth of a second. Older ones are dropped.
+# The most commands that are kept while the stream opens, which takes about 0.1 s. Older ones are dropped.
 LONGEST_QUEUE = 100
 
 
@@ -60,7 +61,7 @@ class CommandLead:
         self.point: tuple[float, ...] | None = None
 
     def command(self, targets: Targets) -> None:
-        """Follows these targets. The next point checks all targets since the last point, because each is near the one before."""
+        """Queues these targets. The next point takes all queued targets in turn, because each is compared with the one before."""
         with self._lock:
             self._pending = [*self._pending, targets][-LONGEST_QUEUE:]
 

@@ -72,7 +72,7 @@ class ArmNode(Node):
             JointState,
             COMMANDS,
             self._command,
-            # Commands that arrive together after a pause of the network are all checked, because each is near the previous one.
+            # The queue keeps all commands that arrive together after a network pause: each is compared with the one before.
             _quality(32, reliable=False),
             callback_group=MutuallyExclusiveCallbackGroup(),
         )

@@ -19,7 +19,7 @@ from sevenbot_ros.settings import Settings
 
 # `Stream.send` is called this many seconds before a point is due, and waits for the rest itself.
 MARGIN = 0.002
-# A stream that nothing leads any more ends within this time, in seconds.
+# The longest wait for the end of a stream that nothing leads any more, in seconds.
 LONGEST_END = 5.0
 
 

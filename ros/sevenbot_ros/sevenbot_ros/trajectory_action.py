@@ -28,7 +28,7 @@ from sevenbot_ros.lead import Outcome, TrajectoryLead
 from sevenbot_ros.node import ArmNode
 from sevenbot_ros.trajectory import RawPoint, plan
 
-# The tolerances if a goal names none: in degrees, because a loaded joint bends, and in seconds.
+# The tolerances of a goal that names none: an angle in degrees, because a loaded joint bends, and a time in seconds.
 GOAL_TOLERANCE = 3.0
 GOAL_TIME = 2.0
 FEEDBACK_PERIOD = 0.1
@@ -74,7 +74,7 @@ class PublishedAdapter:
 
     def goal(self, request: Any) -> Goal:
         def tolerances(rows: Any) -> dict[str, float]:
-            # 0 is the tolerance of the server, and -1 is none.
+            # 0 selects the tolerance of the server, and a negative value means no limit.
             return {row.name: math.inf if row.position < 0.0 else row.position for row in rows if row.position}
 
         return Goal(
@@ -198,7 +198,7 @@ class TrajectoryAction:
         return driver.leads.lead(lead) or lead
 
     def _wait_for(self, start: float, handle: ServerGoalHandle) -> Refusal | None:
-        """Waits until the start of a goal, because the trajectory has to begin where the joints stand then. 0 is now.
+        """Waits until the start of a goal, because the trajectory has to begin where the joints stand then. A start of 0 is now.
 
         Returns the reason if the goal is refused.
         """

@@ -71,7 +71,7 @@ fn run_again(cells: &mut [(String, Cell)]) {
     }
 }
 
-/// The cells with these names, row by row, with their names.
+/// Runs the cells whose names are chosen. Returns their names and outcomes, row by row.
 fn run_cells(is_chosen: impl Fn(&str) -> bool) -> Vec<(String, Cell)> {
     let all = COMMANDS.iter().flat_map(|command| FAULTS.iter().map(move |fault| (*command, *fault)));
     let name = |(command, fault): &(Command, Fault)| format!("{} / {}", command.arguments, fault.name);
@@ -141,7 +141,7 @@ fn table(cells: &[(String, Cell)]) -> String {
         let _ = writeln!(text, "{}", command.arguments);
         for (fault, (_, cell)) in FAULTS.iter().zip(row) {
             let status = cell.status_text();
-            // After a failure, whether the arm did what was asked depends on the moment of the fault.
+            // After a failure, whether the arm did what was asked depends on the moment of the fault. Leave it out.
             let is_success = cell.status == Some(0);
             let done = match cell.is_done.filter(|_| is_success) {
                 None => "",

@@ -33,9 +33,9 @@ const START_UP: u64 = 1_500;
 const USED: usize = 100;
 /// First of the fine targets.
 const FINE_TARGET: u8 = 128;
-/// A joint has reached an angle if it is within this many degrees: servos have play, and the arm bends.
+/// A joint has reached an angle if it is within this many degrees of it: servos have play, and the arm bends.
 const NEAR: f64 = 3.0;
-/// A joint that moves by less than this in [`AFTERWARDS`] stands still, in degrees.
+/// A joint that moves by at most this many degrees in [`AFTERWARDS`] stands still.
 const STILL: f64 = 1.5;
 /// The messages for a supply that is lost and comes back. Which one appears depends on when the command reads the arm.
 const SUPPLY_WORDS: [&str; 4] = [
@@ -137,7 +137,8 @@ fn run_tool(command: Command, port: &Path, folder: &Path) -> Output {
     tool.output()
 }
 
-/// Did the arm do what it was asked? From the state at the end of the command, and some time later.
+/// Did the arm do what it was asked? The check uses its states at the end of the command and [`AFTERWARDS`] later. `None`:
+/// there is nothing to check.
 fn is_done(asked: Asked, simulator: &Simulator, at_end: &Value, later: &Value) -> Option<bool> {
     let is_at = |(joint, degrees): &(usize, f64)| (angle(later, *joint) - degrees).abs() <= NEAR;
     let is_driven = |state: &Value| state["registers"]["motor_state"] == 1;
@@ -187,7 +188,7 @@ fn ends_at(recording: &str, state: &Value) -> bool {
 
 /// The first line of an error or a warning, or else the first line, without what differs from run to run.
 fn first_words(text: &str, port: &str, folder: &Path) -> String {
-    // The set-up makes the arm slow, which a note tells.
+    // The set-up makes the arm slow, and the tool prints a note about it. Leave the note out.
     let text = || text.lines().filter(|line| !line.contains("as an earlier command left it"));
     let begins = |word: &'static str| text().find(move |line| line.starts_with(word));
     let line = begins("error:").or_else(|| begins("warning:")).or_else(|| text().next()).unwrap_or_default();

@@ -74,7 +74,7 @@ fn d10_the_speed_determines_the_time_of_a_move() {
     with_arm(TestSetup::any(), |arm| {
         start_at(arm, 90);
         arm.write(SPEED, &[10]);
-        // 38 degrees at 19 degrees/s.
+        // 38 degrees take 2 s at 19 degrees/s.
         assert_at_least(time_move(arm, 128), Duration::from_secs(2));
         arm.write(SPEED, &[40]);
         assert_at_least(time_move(arm, 90), Duration::from_millis(500));
@@ -112,7 +112,7 @@ fn d11_without_a_speed_the_time_register_applies() {
     });
 }
 
-/// D11: the speed has precedence over the time. Without both, a move has the speed of the motor.
+/// D11: the speed has precedence over the time. If both are 0, a move has the maximum speed of the motor.
 #[test]
 fn d11_speed_has_precedence_over_time_and_the_motor_limits_both() {
     with_arm(TestSetup::any(), |arm| {
@@ -304,7 +304,7 @@ fn d14_reports_take_at_most_half_of_a_slow_line() {
         arm.power_cycle(9_600);
         let start = Instant::now();
         arm.write(FEEDBACK_FREQUENCY, &[50]);
-        // At 50 Hz they take 2 s.
+        // At 50 Hz, these 103 reports would take only 2 s.
         receive_reports(arm, start, 103, 34);
         // Half of the line is free for replies.
         assert_eq!(arm.register(FEEDBACK_FREQUENCY), 50, "the register keeps its value");

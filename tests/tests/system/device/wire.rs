@@ -11,7 +11,7 @@ use system_tests::registers::{
 use system_tests::wait::TIMEOUT;
 use system_tests::{Need, TestSetup, read_request, with_arm, write_request};
 
-/// The header of a write of 255 values. A deframer may wait for the rest of its 262 bytes.
+/// The header of a write of 255 values. A deframer may wait for the rest of this frame of 262 bytes.
 const FALSE_HEADER: [u8; 5] = [0xAA, 0x77, 0x06, 0x10, 0xFF];
 
 /// The documented examples, with an arm in its standard pose.

@@ -103,8 +103,8 @@ fn fragments_without_end_keep_nobody_waiting() {
     assert!(count < 20_000, "the server ended the connection");
 }
 
-/// The server reads 32 KiB of each connection, and not faster than four lines of 115 200 baud carry: this takes 711 ms, less
-/// the 20 ms by which a connection may be ahead at its beginning.
+/// The server ends a connection after 32 KiB without a whole message. It reads each connection at 46 080 bytes/s at most, four
+/// times the rate of the arm's line, so 32 KiB take 711 ms. A connection may be 20 ms ahead at its beginning.
 #[test]
 fn fragments_without_end_do_not_begin_again_at_once() {
     let served = Served::start(1, &[]);

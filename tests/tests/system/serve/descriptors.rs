@@ -1,4 +1,4 @@
-//! A server that may have few file descriptors.
+//! `sevenbot serve` with a low limit of file descriptors.
 
 use std::io::{Read, Write};
 use std::os::unix::net::UnixStream;
@@ -10,7 +10,7 @@ use system_tests::wait::wait_until;
 
 use super::served::{Served, exchange, simulator};
 
-/// The limit of `ulimit -n 64`.
+/// The most file descriptors that the server may have open.
 const DESCRIPTORS: usize = 64;
 /// Connections of each kind. All kinds together exceed the limit.
 const CONNECTIONS: usize = 60;

@@ -19,7 +19,7 @@ use tungstenite::client::IntoClientRequest;
 use tungstenite::http::HeaderValue;
 use tungstenite::{Message, WebSocket};
 
-/// A header of a page that a program of this computer serves.
+/// The `Origin` header of a web page that a program of this computer serves.
 pub(crate) const LOCAL_PAGE: (&str, &str) = ("origin", "http://localhost:3000");
 
 /// A simulator and a server, in a folder with their links.

@@ -64,7 +64,7 @@ fn each_program_has_its_own_reports_and_the_next_one_on_its_terminal_has_none() 
     next.expect_nothing_more();
 }
 
-/// M4: golden frames of map 2.1 ask for 30 reports of the angles a second, and for 5 of the loads.
+/// M4: the two golden frames of map 2.1 ask for 30 angle reports and 5 load reports per second.
 #[test]
 fn programs_of_both_maps_have_their_own_reports() {
     let served = Served::start(2, &[]);

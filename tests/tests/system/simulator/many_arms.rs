@@ -91,7 +91,7 @@ fn a_write_reaches_one_arm_only() {
         assert_eq!((other.register(DEVICE_ID), other.register(SPEED)), (0, 60));
         assert_eq!(other.register(EEPROM_LOCK), 1);
     }
-    // After a kill too: each arm has its own settings file.
+    // This also holds after a kill: each arm has its own settings file.
     drop([first, second, third]);
     send_signal(&arms.process, Signal::KILL);
     wait_for_exit(&mut arms.process);

@@ -33,7 +33,7 @@ fn row(screen: &str, joint: u8) -> Vec<&str> {
 fn masked(screen: &str, port: &Path) -> String {
     let port = port.to_str().expect("port names are UTF-8");
     let mask = |line: &str| {
-        // The weight of the arm loads the motors, so that the supply is between these two values.
+        // The weight of the arm loads the motors, so the supply reads 7.3 V or 7.4 V.
         let line = line.replace(port, "PORT").replace("supply 7.3 V", "supply 7.4 V");
         // The tip droops with the forearm, so its position differs between runs.
         let line = line.split("   tip ").next().unwrap_or_default();
@@ -118,7 +118,7 @@ fn keys_move_the_tip() {
         terminal.wait_for("114.0 °/s");
         terminal.keys("j");
         terminal.wait_for("base axes");
-        // 20 mm to the right at 185 mm: the base turns by 6 degrees.
+        // The tip, 185 mm from the axis of the base, goes 20 mm to the right: the base turns by 6 degrees.
         for _ in 0..4 {
             terminal.keys(RIGHT);
         }

@@ -150,7 +150,7 @@ fn a_movement_is_recorded_by_hand_and_played() {
     succeeded(arm.sevenbot(&["pose", "90", "50", "65", "90", "90", "90", "80", "--wait"]));
     succeeded(arm.sevenbot(&["record", "--yes", "--seconds", "1", &file]));
     let moments = fs::read_to_string(&file).unwrap_or_default();
-    // A report each 34 ms.
+    // The arm sends a report each 34 ms.
     assert!(moments.lines().any(|line| line.starts_with("0.034 ")), "{moments}");
     // The arm fell while it was limp. It holds where it fell, and does not go back to its target.
     let degrees = |name| {

@@ -80,7 +80,7 @@ fn print_percentiles(what: &str, mut times: Vec<Duration>) {
     println!("{:10.3} ms, 99 of 100 under {:.3} ms: {what}", millis(percentile(50)), millis(percentile(99)));
 }
 
-/// Prints the load of idle arms, and of arms with a host at 100 Hz each. The load at 100 Hz is computed from the cost of a
+/// Prints the load of idle arms, and of arms that a host polls at 100 Hz each. The load at 100 Hz is computed from the cost of a
 /// reply, which hardly depends on the rate.
 fn print_arms(program: &Path) -> Outcome {
     println!(

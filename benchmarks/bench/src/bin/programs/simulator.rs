@@ -23,7 +23,7 @@ pub(crate) type Outcome<T = ()> = Result<T, Box<dyn Error>>;
 const WATCH_TIME: Duration = Duration::from_secs(5);
 /// The time to wait until the servos have started, and until the polling is steady.
 const START_TIME: Duration = Duration::from_secs(2);
-/// The period of a host at 100 Hz.
+/// The shortest polling period: 100 Hz.
 const PERIOD: Duration = Duration::from_millis(10);
 /// The polling period is at least this long per arm, so that this program does not limit the rate.
 const PERIOD_PER_ARM: Duration = Duration::from_micros(100);

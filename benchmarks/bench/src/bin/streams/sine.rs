@@ -14,7 +14,7 @@ use protocol_core::request::Request;
 use protocol_core::time::Instant;
 use protocol_core::wire::FrameBuffer;
 
-/// Degrees and hertz.
+/// The sine: its amplitude in degrees, and its frequency in hertz.
 const AMPLITUDE: f64 = 30.0;
 const FREQUENCY: f64 = 0.2;
 /// The middle of the sine for each joint, in degrees.

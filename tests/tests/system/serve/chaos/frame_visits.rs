@@ -51,8 +51,8 @@ impl<'a> FrameVisit<'a> {
             .or(Some([b"damaged".to_vec(), frame].concat()))
     }
 
-    /// Removes the frame that begins with `start`, and all bytes before it. Those are replies to another program. They need not
-    /// be whole frames, because the kernel drops the bytes in one of its queues.
+    /// Removes the frame that begins with `start`, and all bytes before it, which are replies to another program. These replies
+    /// need not be whole frames, because the kernel drops the bytes in one of its queues.
     fn take_behind_stale(&mut self, start: &[u8]) -> bool {
         let length = 7 + usize::from(start[4]);
         let frames = self.received.windows(length);
@@ -106,7 +106,7 @@ impl Visit for FrameVisit<'_> {
                 let is_report =
                     self.has_reports && frame.starts_with(&[0xAA, 0x77, 0x03, PRESENT_POSITION, 7]);
                 if !is_report {
-                    // If an outage took the write, the reply has another value.
+                    // If the write was lost in an outage, the reply holds another value.
                     if wait.may_be_cut() && frame[..5] == start[..5] {
                         return Ok(Answer::Cut);
                     }

@@ -43,8 +43,8 @@ const PROGRAMS: usize = 50;
 const BEFORE_OUTAGES: Duration = Duration::from_secs(4);
 const BETWEEN_OUTAGES: Duration = Duration::from_secs(56);
 const OUTAGE: Duration = Duration::from_millis(3_500);
-/// If `SERVE_CHAOS_SECONDS` is set, a target of this age is late. A target waits in the server for 200 ms at most; the rest is
-/// for times in which the system does not run a program. Other test runs use `OUTAGE` instead, because the machine may be busy.
+/// If `SERVE_CHAOS_SECONDS` is set, a target of this age is late. A target waits in the server for 200 ms at most; the rest
+/// allows for times in which the system does not run a program. Other test runs use `OUTAGE`, because the machine may be busy.
 const LATE: Duration = Duration::from_millis(2_000);
 /// The timeout of one read in [`wait_for_arm`]. It is long: fifty programs use the line, and the machine may be busy.
 const ANSWERED: Duration = Duration::from_secs(5);
@@ -161,7 +161,7 @@ fn ways_in(served: &Served) -> Vec<WayIn> {
     all
 }
 
-/// Waits until the arm answers a program that connects. A failure tells what the line and both programs were doing.
+/// Waits until the arm answers a program that connects. The text of a failure describes the line, the server and the simulator.
 fn wait_for_arm(chaos: &Chaos, served: &Served) {
     wait_for("the arm answers", || {
         served.ask_for_arm(ANSWERED).map_err(|error| {

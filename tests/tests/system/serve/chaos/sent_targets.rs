@@ -16,7 +16,7 @@ const BASE: u64 = 100;
 const LOWEST: u64 = 40;
 /// The number of latest writes whose times are kept.
 const KEPT: u64 = 1 << 20;
-/// Number of joints, and of the last positions that are remembered.
+/// The number of joints, and the number of last positions that are kept.
 const JOINTS: usize = 7;
 const REMEMBERED: usize = 512;
 
@@ -24,7 +24,7 @@ const REMEMBERED: usize = 512;
 pub(crate) struct SentTargets {
     start: Instant,
     next: AtomicU64,
-    /// Microseconds from `start` on at which the target had been sent; 0: it is being sent.
+    /// For each write, the microseconds from `start` to the end of its sending. 0: it is being sent.
     times: Vec<AtomicU64>,
     arrived: Mutex<Vec<Duration>>,
     /// The last positions that the arm sent. A `stop` through the maker's WebSocket writes one of these as targets. Such a

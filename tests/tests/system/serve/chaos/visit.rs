@@ -20,8 +20,8 @@ pub(super) trait Visit: Sized {
     /// Ends the connection in one of several ways.
     fn leave(self, random: &mut Random, tally: &mut Tally);
 
-    /// Asks questions and does other acts at random, then leaves. Stops at the first answer other than [`Answer::Replied`], or at
-    /// the end of the connection, and returns it.
+    /// Asks questions and does other acts at random, then leaves and returns [`Answer::Replied`]. Stops at the first other
+    /// answer, and returns that answer. If the connection ends, the answer is [`Answer::Ended`].
     fn run(mut self, own: Option<u8>, random: &mut Random, tally: &mut Tally) -> Answer {
         let acts = 1 + random.below(20);
         for turn in 0..acts {

@@ -219,7 +219,8 @@ pub(crate) fn visit(chaos: &Chaos, way_in: &WayIn, number: u8, seed: u64) -> Tal
         };
         match last {
             Some(Answer::Replied) => {}
-            // After this time the server drops the requests of this program that it still holds.
+            // The server keeps the requests of an ended connection for 200 ms at most. After this longer pause, none of them is
+            // left.
             Some(Answer::Cut) => thread::sleep(Duration::from_millis(400)),
             None | Some(Answer::Ended) if tally.replies == before => {
                 tally.turned_away += 1;

@@ -42,7 +42,7 @@ pub(crate) struct Security {
 }
 
 impl Security {
-    /// With a certificate, TCP and WebSocket connections are encrypted, and the server has to prove that it holds it.
+    /// With a certificate, TCP and WebSocket connections are encrypted, and the server has to present this certificate.
     pub(crate) fn new(token: &'static str, certificate: Option<PathBuf>) -> Self {
         let tls = certificate.map(|path| {
             let mut roots = RootCertStore::empty();
@@ -190,7 +190,7 @@ impl WebWire {
             let (name, value) = LOCAL_PAGE;
             request.headers_mut().insert(name, HeaderValue::from_static(value));
         }
-        // A handshake that is interrupted by the timeout would have to be continued.
+        // A short timeout could interrupt the handshake, and this function does not continue it.
         stream.set_read_timeout(Some(SEND_TIME)).map_err(|error| error.to_string())?;
         let (socket, _) =
             tungstenite::client(request, security.secure(stream)).map_err(|error| error.to_string())?;

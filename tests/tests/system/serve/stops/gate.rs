@@ -70,7 +70,7 @@ impl Gate {
         self.changed.notify_all();
     }
 
-    /// Does the turn go on?
+    /// True while the turn of this thread goes on.
     pub(crate) fn is_open(&self) -> bool {
         let turns = self.lock();
         turns.count == TURN.get() && !turns.is_over

@@ -29,7 +29,7 @@ use self::program::{Program, TOKEN, stream};
 use super::served::Served;
 
 const SEED: u64 = 25;
-/// First register of the fine targets, of the fine positions, and the bytes of each.
+/// The first register of the fine targets, the first register of the fine positions, and the number of bytes of each block.
 const FINE_TARGET: u8 = 128;
 const FINE_POSITION: u8 = 142;
 const FINE: u8 = 14;
@@ -40,14 +40,15 @@ const WATCHED_AT_REST: Duration = Duration::from_millis(1_000);
 const BETWEEN_RESTS: usize = 50;
 /// The most that a holding joint moves, in hundredths of a degree.
 const STILL: u16 = 30;
-/// The farthest that its weight draws a joint off its target, in hundredths of a degree.
+/// The farthest that the weight of the arm moves a joint off its target, in hundredths of a degree.
 const DROOP: u16 = 150;
 
 /// The longest braking distance, in hundredths of a degree. A joint that is farther from the target of a stop is not braking:
 /// on a busy machine the program had read the position long before. The server may hold such a joint where it is.
 const LONGEST_BRAKING: u16 = 1_500;
 
-/// The longest time until a stop reaches the arm, and the most bytes to the arm before it: what the line carries in this time.
+/// The longest time until a stop reaches the arm. The line (115 200 baud) carries 230 bytes in this time, so at most 230 bytes
+/// may reach the arm before the stop.
 const LATEST: Duration = Duration::from_millis(20);
 const MOST_BEFORE: u64 = 230;
 
@@ -59,7 +60,7 @@ struct Target {
     frame: Vec<u8>,
 }
 
-/// What went to the arm: all bytes, and the writes of targets in their order.
+/// What went to the arm: the number of all bytes, and the writes of targets in their order.
 #[derive(Default)]
 struct Sent {
     bytes: u64,
