@@ -158,7 +158,7 @@ class Arm:
     """A 7Bot V2 arm.
 
     `Arm("/dev/ttyUSB0")` opens a port, `Arm("tcp://HOST:PORT", token="...")` connects to a server, `Arm()` opens the only port with
-    an arm that answers, `Arm(id=5)` the one of the arm with this number (register 11), `Arm(chip="...")` the one with this `chip_id`,
+    an arm that answers, `Arm(id=5)` the port of the arm with this number (register 11), `Arm(chip="...")` that of the arm with this `chip_id`,
     and `Arm.simulated()` is an arm in virtual time. All have the same methods. `with Arm() as arm:` stops what moves at the
     end, as `stop()`, and closes the port.
 
@@ -699,7 +699,7 @@ class Observation:
         """The loads in percent of the stall torque, positive if the motor pushes towards greater angles: as `positions`."""
     @property
     def time(self) -> float:
-        """When the answer was here: seconds since the arm was opened, on the clock of its line. It never goes back."""
+        """When the answer came: seconds since the arm was opened, on the clock of its line. It never goes back."""
     @property
     def age(self) -> float:
         """The longest time between the measurement and `time`, in seconds: a cycle of the controller, and that of the exchange. While
@@ -707,7 +707,7 @@ class Observation:
         """
     @property
     def monotonic(self) -> float:
-        """When the answer was here, on the clock of `time.monotonic()`."""
+        """When the answer came, on the clock of `time.monotonic()`."""
     @staticmethod
     def _of(
         positions: Iterable[float],

@@ -14,7 +14,7 @@ use crate::bulk;
 use crate::errors::{InvalidType, NotServed, raised, without_attribute};
 use crate::motion::{self, PlayOptions, RecordOptions, TipWish};
 use crate::numbers::{Angles, Values, duration, seed};
-use crate::observation::Observation;
+use crate::observation::{Answer, Observation};
 use crate::opening::{self, Opened};
 use crate::ports::{self, Wanted};
 use crate::recording::Recording;
@@ -30,7 +30,7 @@ mod calls;
 /// A 7Bot V2 arm.
 ///
 /// `Arm("/dev/ttyUSB0")` opens a port, `Arm("tcp://HOST:PORT", token="...")` connects to a server, `Arm()` opens the only port with
-/// an arm that answers, `Arm(id=5)` the one of the arm with this number (register 11), `Arm(chip="...")` the one with this `chip_id`,
+/// an arm that answers, `Arm(id=5)` the port of the arm with this number (register 11), `Arm(chip="...")` that of the arm with this `chip_id`,
 /// and `Arm.simulated()` is an arm in virtual time. All have the same methods. `with Arm() as arm:` stops what moves at the
 /// end, as `stop()`, and closes the port.
 ///
@@ -155,8 +155,10 @@ impl Arm {
 
     #[doc = include_str!("arm/help/observe.txt")]
     fn observe(&self, py: Python<'_>) -> PyResult<Observation> {
-        let read = raised(py, self.worker.read(py, Observation::read)?)?;
-        read.ok_or_else(|| NotServed::of_arm(py, "positions in hundredths, velocities and loads"))
+        let read = raised(py, self.worker.read(py, Answer::read)?)?;
+        let served =
+            read.ok_or_else(|| NotServed::of_arm(py, "positions in hundredths, velocities and loads"));
+        served?.observation(py)
     }
 
     #[doc = include_str!("arm/help/is_connected.txt")]

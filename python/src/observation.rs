@@ -20,15 +20,7 @@ pub(crate) struct Observation {
     loads: [f64; 7],
     time: f64,
     age: f64,
-    monotonic: Monotonic,
-}
-
-/// An instant on the clock of `time.monotonic()`.
-#[derive(Clone, Copy)]
-enum Monotonic {
-    Instant(Instant),
-    /// In a copy that `pickle` made: the seconds on the clock of the process that measured.
-    Seconds(f64),
+    monotonic: f64,
 }
 
 /// The arguments of [`Observation::_of`]: positions, velocities, loads, time, age and `monotonic`.
@@ -37,26 +29,39 @@ type Pickled = (Angles, Angles, Angles, f64, f64, f64);
 /// A cycle of the controller, in seconds.
 const CYCLE: f64 = 0.01;
 
-impl Observation {
-    /// Reads an observation; `None` if the firmware does not have these registers.
+/// The answer of the arm, read without the interpreter.
+pub(crate) struct Answer {
+    state: FineState,
+    time: f64,
+    age: f64,
+    came: Instant,
+}
+
+impl Answer {
+    /// Reads the arm; `None` if the firmware does not have these registers.
     pub(crate) fn read(arm: &mut Arm) -> Result<Option<Self>, Error> {
         let before = arm.elapsed();
         let Some(state) = arm.fine_state_if_served()? else { return Ok(None) };
         let time = arm.elapsed();
         let waited = time.saturating_sub(before).as_secs_f64();
-        Ok(Some(Self::of(&state, time.as_secs_f64(), waited)))
+        Ok(Some(Self { state, time: time.as_secs_f64(), age: CYCLE + waited, came: Instant::now() }))
     }
 
-    fn of(state: &FineState, time: f64, waited: f64) -> Self {
+    /// The observation, with the time of the answer on the clock of Python.
+    pub(crate) fn observation(self, py: Python<'_>) -> PyResult<Observation> {
         let tenths = |values: [i16; 7]| values.map(|value| f64::from(value) / 10.0);
-        Self {
-            positions: state.positions.map(|angle| angle.map_or(f64::NAN, FineAngle::degrees)),
-            velocities: tenths(state.velocities),
-            loads: tenths(state.loads),
-            time,
-            age: CYCLE + waited,
-            monotonic: Monotonic::Instant(Instant::now()),
-        }
+        // Read this before Python's clock. If the thread waits between the two, the result is later than the answer, but not
+        // later than now, and never earlier than the request.
+        let since = self.came.elapsed().as_secs_f64();
+        let now: f64 = py.import("time")?.call_method0("monotonic")?.extract()?;
+        Ok(Observation {
+            positions: self.state.positions.map(|angle| angle.map_or(f64::NAN, FineAngle::degrees)),
+            velocities: tenths(self.state.velocities),
+            loads: tenths(self.state.loads),
+            time: self.time,
+            age: self.age,
+            monotonic: now - since,
+        })
     }
 }
 
@@ -80,7 +85,7 @@ impl Observation {
         bulk::numbers(py, &self.loads)
     }
 
-    /// When the answer was here: seconds since the arm was opened, on the clock of its line. It never goes back.
+    /// When the answer came: seconds since the arm was opened, on the clock of its line. It never goes back.
     #[getter]
     const fn time(&self) -> f64 {
         self.time
@@ -93,15 +98,10 @@ impl Observation {
         self.age
     }
 
-    /// When the answer was here, on the clock of `time.monotonic()`.
+    /// When the answer came, on the clock of `time.monotonic()`.
     #[getter]
-    fn monotonic(&self, py: Python<'_>) -> PyResult<f64> {
-        let instant = match self.monotonic {
-            Monotonic::Instant(instant) => instant,
-            Monotonic::Seconds(seconds) => return Ok(seconds),
-        };
-        let now: f64 = py.import("time")?.call_method0("monotonic")?.extract()?;
-        Ok(now - instant.elapsed().as_secs_f64())
+    const fn monotonic(&self) -> f64 {
+        self.monotonic
     }
 
     /// From its numbers: what `pickle` calls.
@@ -114,13 +114,13 @@ impl Observation {
         age: f64,
         monotonic: f64,
     ) -> Self {
-        Self { positions, velocities, loads, time, age, monotonic: Monotonic::Seconds(monotonic) }
+        Self { positions, velocities, loads, time, age, monotonic }
     }
 
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Pickled)> {
         let (positions, velocities, loads) =
             (self.positions.into(), self.velocities.into(), self.loads.into());
-        let arguments = (positions, velocities, loads, self.time, self.age, self.monotonic(py)?);
+        let arguments = (positions, velocities, loads, self.time, self.age, self.monotonic);
         Ok((py.get_type::<Self>().getattr("_of")?, arguments))
     }
 
