@@ -115,7 +115,7 @@ class GuardWarning(UserWarning):
 
 @overload
 def forward(angles: Iterable[float], /) -> Tip:
-    """Where an arm with these seven angles is, in degrees: forward kinematics. The same as `Tip.of`."""
+    """Where an arm is whose seven angles are these, in degrees: forward kinematics. The same as `Tip.of`."""
 @overload
 def forward(
     angle1: float,
@@ -566,7 +566,7 @@ class SimulatedArms:
     def read(self, out: None = None) -> NDArray[float64]: ...
     @overload
     def observe(self, out: _Numbers) -> _Numbers:
-        """What the last reads told: `out`, or a new array (n, 32). No time passes."""
+        """The observations of the last reads: `out`, or a new array (n, 32). No time passes."""
     @overload
     def observe(self, out: None = None) -> NDArray[float64]: ...
     def reset(
@@ -652,7 +652,7 @@ class Tip:
     @overload
     @staticmethod
     def of(angles: Iterable[float], /) -> Tip:
-        """Where an arm with these seven angles is, in degrees: forward kinematics, without an arm."""
+        """Where an arm is whose seven angles are these, in degrees: forward kinematics, without an arm."""
     @overload
     @staticmethod
     def of(
@@ -774,7 +774,7 @@ class JointStatus:
 
 @final
 class Status:
-    """The health of the arm at one instant. Only this project's firmware tells it. Equal if all registers of the arm were equal."""
+    """The health of the arm at one instant. Only this project's firmware has it. Two are equal if all registers of the arm were equal."""
     @property
     def is_healthy(self) -> bool:
         """Does nothing need attention?"""
@@ -863,14 +863,14 @@ class Stream:
         restart, the next point is a first one again.
         """
     def latest(self, angles: _Goals) -> StreamCounts:
-        """Offers an action, and does not wait: seven angles, as for `send`; `None` keeps that of the action before.
+        """Offers an action, and does not wait: seven angles, as for `send`; `None` keeps the joint's angle in the action before.
 
         A thread outside the interpreter sends the newest action each `period`, and without a new one the last one again. Once
         the program has offered nothing for the time of `watchdog`, it sends nothing, so that the watchdog of the arm acts after
         the same time again. Returns how the actions became points so far: see `StreamCounts`.
 
-        A failure of the thread is raised by the next call, which then offers nothing. It goes on after an `ArmProblem` of a joint.
-        After all other failures, and after `Arm.stop` (`Interrupted`), it begins again with the next action. That is a first one,
+        A failure of the thread is raised by the next call, which then offers nothing. The thread goes on after an `ArmProblem` of a joint.
+        After all other failures, and after `Arm.stop` (`Interrupted`), it begins again with the next action. This is a first one,
         as of `send`, and so is the next one after the watchdog has acted. A simulated arm sends while its time passes: in
         `Arm.sleep`, or when the arm is asked. `record`, `sample` and moves hold the sender up.
         """
@@ -932,8 +932,8 @@ class Recording:
     def times(self) -> NDArray[float64]:
         """The times of the moments in seconds: a numpy array, or a tuple without numpy.
 
-        `Arm.record` has the times of measurement: the arm measures at even times, and a moment that arrives late still has its
-        own.
+        `Arm.record` has the times of measurement: the arm measures at even times, and a moment that arrives late still has the
+        time at which it was measured.
         """
     @property
     def arrivals(self) -> NDArray[float64] | None:
@@ -962,7 +962,7 @@ class Recording:
 class Simulation:
     """The simulated arm of `Arm.simulated()`.
 
-    Its time is virtual: it passes only while the arm is asked or slept for, and in `advance`. A program may think as long
+    Its time is virtual: it passes only while the arm is asked, in `Arm.sleep` and in `advance`. A program may think as long
     as it likes, and gets the same result on every machine.
     """
     @property

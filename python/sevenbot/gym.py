@@ -2,7 +2,7 @@
 
     env = gymnasium.make("sevenbot.gym:sevenbot/Reach-v0")
 
-The part before the colon is what Gymnasium imports: since its version 1.0 it looks for no entry points of packages.
+The part before the colon is what Gymnasium imports: since version 1.0 Gymnasium looks for no entry points of packages.
 
 | name | task |
 | --- | --- |

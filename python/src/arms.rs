@@ -219,7 +219,7 @@ impl SimulatedArms {
         }
     }
 
-    /// What the last reads told: `out`, or a new array (n, 32). No time passes.
+    /// The observations of the last reads: `out`, or a new array (n, 32). No time passes.
     #[pyo3(signature = (out = None))]
     fn observe<'py>(&self, py: Python<'py>, out: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
         if out.is_some_and(is_single) {

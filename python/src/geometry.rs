@@ -11,7 +11,7 @@ use crate::bulk;
 use crate::errors::{InvalidValue, raised};
 use crate::tip::Tip;
 
-/// Where an arm with these seven angles is, in degrees: forward kinematics. The same as `Tip.of`.
+/// Where an arm is whose seven angles are these, in degrees: forward kinematics. The same as `Tip.of`.
 #[pyfunction]
 #[pyo3(signature = (*angles))]
 pub(crate) fn forward(py: Python<'_>, angles: &Bound<'_, PyTuple>) -> PyResult<Tip> {

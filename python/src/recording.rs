@@ -117,8 +117,8 @@ impl Recording {
 
     /// The times of the moments in seconds: a numpy array, or a tuple without numpy.
     ///
-    /// `Arm.record` has the times of measurement: the arm measures at even times, and a moment that arrives late still has its
-    /// own.
+    /// `Arm.record` has the times of measurement: the arm measures at even times, and a moment that arrives late still has the
+    /// time at which it was measured.
     #[getter]
     fn times<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let times: Vec<f64> = self.moments.moments().map(|moment| moment.time.as_secs_f64()).collect();

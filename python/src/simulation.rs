@@ -25,7 +25,7 @@ const ADVANCE_SLICE: Duration = Duration::from_secs(20);
 
 /// The simulated arm of `Arm.simulated()`.
 ///
-/// Its time is virtual: it passes only while the arm is asked or slept for, and in `advance`. A program may think as long
+/// Its time is virtual: it passes only while the arm is asked, in `Arm.sleep` and in `advance`. A program may think as long
 /// as it likes, and gets the same result on every machine.
 #[pyclass(frozen, module = "sevenbot")]
 #[derive(Clone)]

@@ -13,7 +13,7 @@ use crate::errors::InvalidValue;
 use crate::health::{JointStatus, Problem};
 use crate::tip::html_table;
 
-/// The health of the arm at one instant. Only this project's firmware tells it. Equal if all registers of the arm were equal.
+/// The health of the arm at one instant. Only this project's firmware has it. Two are equal if all registers of the arm were equal.
 #[pyclass(frozen, module = "sevenbot")]
 pub(crate) struct Status {
     block: StatusBlock,

@@ -208,14 +208,14 @@ impl Stream {
         Ok(number)
     }
 
-    /// Offers an action, and does not wait: seven angles, as for `send`; `None` keeps that of the action before.
+    /// Offers an action, and does not wait: seven angles, as for `send`; `None` keeps the joint's angle in the action before.
     ///
     /// A thread outside the interpreter sends the newest action each `period`, and without a new one the last one again. Once
     /// the program has offered nothing for the time of `watchdog`, it sends nothing, so that the watchdog of the arm acts after
     /// the same time again. Returns how the actions became points so far: see `StreamCounts`.
     ///
-    /// A failure of the thread is raised by the next call, which then offers nothing. It goes on after an `ArmProblem` of a joint.
-    /// After all other failures, and after `Arm.stop` (`Interrupted`), it begins again with the next action. That is a first one,
+    /// A failure of the thread is raised by the next call, which then offers nothing. The thread goes on after an `ArmProblem` of a joint.
+    /// After all other failures, and after `Arm.stop` (`Interrupted`), it begins again with the next action. This is a first one,
     /// as of `send`, and so is the next one after the watchdog has acted. A simulated arm sends while its time passes: in
     /// `Arm.sleep`, or when the arm is asked. `record`, `sample` and moves hold the sender up.
     fn latest(&self, py: Python<'_>, angles: Goals) -> PyResult<StreamCounts> {

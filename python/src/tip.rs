@@ -39,7 +39,7 @@ impl Tip {
 
 #[pymethods]
 impl Tip {
-    /// Where an arm with these seven angles is, in degrees: forward kinematics, without an arm.
+    /// Where an arm is whose seven angles are these, in degrees: forward kinematics, without an arm.
     #[staticmethod]
     #[pyo3(signature = (*angles))]
     fn of(py: Python<'_>, angles: &Bound<'_, PyTuple>) -> PyResult<Self> {

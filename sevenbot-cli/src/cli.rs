@@ -30,7 +30,7 @@ Examples:
   sevenbot monitor
 
 Without --port and SEVENBOT_PORT the only port that leads to an arm is used, or
-that of the only simulator that runs.
+the port of the only running simulator.
 
 Exit status:
   0    done

@@ -18,7 +18,7 @@ def generate_launch_description() -> LaunchDescription:
         [
             DeclareLaunchArgument("port", default_value="", description="serial port, or sim"),
             DeclareLaunchArgument("namespace", default_value="", description="namespace of this arm"),
-            DeclareLaunchArgument("frame_prefix", default_value="", description="what stands before its frames, as left/"),
+            DeclareLaunchArgument("frame_prefix", default_value="", description="prefix of the names of its frames, as left/"),
             DeclareLaunchArgument("use_sim_time", default_value="false", description="true with port:=sim"),
             Node(
                 package="sevenbot_ros",

@@ -30,9 +30,9 @@ a second.
 
 Exit status 1 if the arm may not hold: it may still be moving, a joint does not
 answer or has let go, or another program sends it elsewhere. 3 if it received no
-stop, because the port cannot be opened or no arm answers. With --all, that of
-the first arm that may not hold; of the ports that cannot be opened, only a
-server, a simulator and the one of --port count as an arm.")]
+stop, because the port cannot be opened or no arm answers. With --all, the
+exit status is the one of the first arm that may not hold. Of the ports that
+cannot be opened, only a server, a simulator and the one of --port count.")]
 pub(crate) struct StopArgs {
     /// Stop every arm of this computer: behind servers of this user, serial ports, and simulators.
     #[arg(long, conflicts_with = "log")]

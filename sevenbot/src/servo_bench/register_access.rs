@@ -30,7 +30,7 @@ pub enum SetError {
         value: i32,
     },
     /// An id is set by [`set_id`](super::set_id::set_id), which first checks that only one servo answers. Nothing was sent.
-    #[error("an id is set by `set-id`, which checks that no other servo has it")]
+    #[error("an id is set by `set-id`, which checks that exactly one servo answers")]
     IdNeedsCheck,
     /// The EEPROM cannot be opened. The register was not written.
     #[error("the servo's EEPROM stays locked: {0}")]

@@ -50,10 +50,10 @@ distance from the line that the rounding causes is shown.
 
 The guard keeps elbow, forearm, wrist, hand, tip and the edge of the disc above
 the table, and 10 mm away from the base: 88 mm round its axis, up to 10 mm
-above the top plate. It checks the point, and the whole way there: of the
-joints from where they are measured, at each 0.1 degrees, or of the straight
-line. A suction cup or claw on the disc is not known to it: set --table higher
-by its length. An arm that is inside already may leave. --dry-run without
+above the top plate. It checks the point and the whole way there: the joints
+from their measured positions, every 0.1 degrees, or the straight line. A
+suction cup or claw on the disc is not known to it: set --table higher by its
+length. An arm that is inside already may leave. --dry-run without
 --keep-tool and --straight checks the point only. --no-guard checks none of
 this: the arm may hit the table and its own base, and the nearest point in an
 error may be inside them.

@@ -20,8 +20,8 @@ use crate::session::Session;
 /// the arm's controller from the bus first, because two masters disturb each other.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-The rate of the servo bus is --rate, or --rates of a scan; --baud is that of an
-arm's host link.
+The rate of the servo bus is --rate, or --rates of a scan; --baud is the rate of
+an arm's host link.
 
 Each joint's servo has its own id: joint 1 has id 0, joint 7 has id 6. A new
 servo usually has id 1 or 0.

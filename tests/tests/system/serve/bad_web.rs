@@ -94,7 +94,9 @@ fn a_client_that_never_reads_blocks_only_itself_and_loses_no_answer() {
     for number in 0..whole {
         let answer = deaf.receive().unwrap_or_else(|| panic!("no answer {number} of {whole}"));
         let message = answer["message"].as_str().unwrap_or_default();
-        assert!(message.starts_with("angles[6] = 1000"), "{number} of {whole}: {answer}");
+        // A server that was late refuses commands behind 200 others.
+        let is_answer = message.starts_with("angles[6] = 1000") || message == "Too many commands wait";
+        assert!(is_answer, "{number} of {whole}: {answer}");
     }
 }
 
