@@ -1,4 +1,4 @@
-//! A stop for all, until each arm has confirmed it.
+//! Repeats a stop until each arm has confirmed it.
 
 use protocol_core::time::{Duration, Instant};
 

@@ -19,7 +19,7 @@ const WINDOW_WATCHDOG: u32 = 1 << 30;
 pub enum ResetCause {
     /// A panic.
     Panic = 0x7B07_DEAD,
-    /// A hard fault.
+    /// A hard fault; bus, memory and usage faults escalate to it.
     HardFault = 0x7B07_FA17,
     /// The crystal stopped while it clocked the core.
     ClockFailure = 0x7B07_C10C,

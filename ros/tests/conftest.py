@@ -1,4 +1,4 @@
-"""What the tests share: nodes and simulators as processes, and a client. `cargo xtask ros` runs them in a network of their own."""
+"""What the tests share: nodes and simulators as processes, and a client. `cargo xtask ros` runs the tests with loopback only."""
 
 from __future__ import annotations
 

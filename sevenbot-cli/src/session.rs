@@ -116,7 +116,7 @@ pub(crate) fn check_is_no_server(port: &str) -> Result<(), CommandError> {
     })
 }
 
-/// Restores the registers that a program left changed when it was killed during a stream, and tells the user.
+/// Resets the registers that a program left changed when it was killed during a stream, and tells the user.
 pub(crate) fn put_right(arm: &mut Arm) -> Result<(), CommandError> {
     if arm.end_abandoned_stream()? {
         note(

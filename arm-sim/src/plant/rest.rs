@@ -1,4 +1,4 @@
-//! Servos at rest. Their steps change only sums and counts, so all of them are simulated at once when the rest ends.
+//! A servo at rest. Its steps change only sums and counts, so they are simulated at once when the rest ends.
 
 use protocol_core::time::Instant;
 

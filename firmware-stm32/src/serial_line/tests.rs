@@ -163,7 +163,7 @@ fn the_direction_covers_a_frame_from_its_first_to_its_last_bit() {
         let frame: Vec<u8> = (0..length).collect();
         assert_eq!(line.push(&frame), frame.len());
         assert!(chip.0.borrow().direction_is_transmit, "before the first byte");
-        chip.0.borrow_mut().event = Some(TransmitEvent::Empty); // The loop pends the interrupt.
+        chip.0.borrow_mut().event = Some(TransmitEvent::Empty); // As the main loop pends it.
         run(&chip, &mut line, latency, 5_000);
         let chip = chip.0.borrow();
         assert_eq!(chip.sent.iter().map(|sent| sent.0).collect::<Vec<_>>(), frame);

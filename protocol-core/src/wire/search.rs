@@ -37,7 +37,7 @@ impl Search {
     pub(super) const START: Self =
         Self { head: 0, wanted: MIN_LENGTH, gap_end: 0, timeout_end: 0, scan_pos: 0, evaluated_end: 0 };
 
-    /// How many bytes are finished.
+    /// How many bytes before the head can be dropped.
     pub(super) const fn finished(&self) -> usize {
         self.head
     }

@@ -49,7 +49,7 @@ class Driver:
         self._thread.start()
 
     def close(self) -> None:
-        """Ends the thread, and closes the arm, which holds."""
+        """Ends the thread, makes the arm hold, and closes it."""
         self._closing.set()
         self._thread.join()
 

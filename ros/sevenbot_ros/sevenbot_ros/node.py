@@ -104,7 +104,7 @@ class ArmNode(Node):
         self.driver.start()
 
     def close(self) -> None:
-        """Close the arm, which holds."""
+        """Make the arm hold, and close it."""
         self.driver.close()
 
     def _trigger(

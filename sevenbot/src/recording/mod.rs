@@ -46,7 +46,7 @@ const ROUNDING_DEGREES: f64 = 1.0;
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Recording {
-    /// Each moment with its line number.
+    /// Each moment with its line number, or counted from 1 if there is no text.
     moments: Vec<(usize, Moment)>,
 }
 

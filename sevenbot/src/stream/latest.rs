@@ -173,7 +173,7 @@ impl LatestPoints {
         self.leading = None;
     }
 
-    /// How the actions became points so far.
+    /// The counts of points and actions so far.
     #[must_use]
     pub const fn counts(&self) -> LatestCounts {
         self.counts

@@ -99,7 +99,7 @@ impl App {
         }
     }
 
-    /// Saves the reached goals and the time as a text file.
+    /// Saves title, date, goals with marks, and the time of a solution as a text file.
     fn save_result(&self) {
         let (Some(exercise), Some(attempt)) = (self.exercises.exercise(), &self.exercises.attempt) else {
             return self.dom.notice(self.language.text("exercise-not-begun"));

@@ -16,7 +16,7 @@ const LICENCE_FILES: [&str; 6] = ["copying", "copyright", "licence", "license", 
 /// The line between two parts of the text.
 const RULE: &str = "\n================================================================================\n";
 
-/// The list of all crates, and each text once.
+/// The list of the released crates, and each text of a licence once.
 pub(super) fn text() -> TaskResult<String> {
     let Metadata { packages, resolve } = metadata(&["--locked"])?;
     let is_released = |package: &&Package| RELEASED.contains(&package.name.as_str());

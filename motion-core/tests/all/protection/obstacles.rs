@@ -172,8 +172,8 @@ fn d27_the_next_target_clears_the_bit_and_tries_again() {
 fn d27_a_joint_that_carries_more_than_its_limit_sinks_slowly() {
     let mut rig = Rig::started();
     let joint = joint(3);
-    // The forearm is level and carries 250 g. The limit is 2 to 3 % below the load that this takes, so limit + 5 %
-    // carries it.
+    // The forearm is level and carries 250 g. The limit is below its load by 2 to 3 % of the stall torque, so the limit + 5 %
+    // (D27) carries it.
     rig.plant.set_load(250);
     rig.run_ms(1_000);
     let carried = rig.plant.load(joint).abs();

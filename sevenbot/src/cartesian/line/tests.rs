@@ -64,7 +64,7 @@ fn the_tool_turns_on_the_way_and_makes_the_line_slower() {
 
 #[test]
 fn joint_4_turns_first_where_it_moves_nothing() {
-    // The tip moves to the side and the tool stays forward, so the hand has to bend to the side from a straight forearm.
+    // At the start the hand is in line with the forearm. The tip moves to the side and the tool stays forward, so the hand bends.
     let line = plan(STANDARD, [40.0, 250.0, 219.0], Vector::new(0.0, 1.0, 0.0), 30.0).expect("a line");
     let first = line.first_turn.expect("a turn of joint 4").degrees();
     assert!(!(20.0..=160.0).contains(&first), "{first}");

@@ -78,7 +78,6 @@ fn a_step_out_of_range_is_refused() {
     });
 }
 
-/// Runs the tool in a terminal.
 fn calibrate_in_terminal(arm: &StartedArm, arguments: &[&str]) -> Terminal {
     let port = arm.port().to_str().expect("UTF-8");
     Terminal::run(sevenbot(), &[&["--port", port, "calibrate"], arguments].concat())

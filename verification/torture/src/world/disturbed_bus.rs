@@ -68,8 +68,9 @@ pub(super) struct DisturbedBus {
     plant: Plant,
     motion_checker: MotionChecker,
     truths: PerJoint<JointTruth>,
-    /// A hand pushes the joint, a wall is in its way, or a thing is between the claws.
+    /// A hand pushes the joint.
     has_push: PerJoint<bool>,
+    /// A wall is in the way of the joint.
     has_wall: PerJoint<bool>,
     has_thing: bool,
     push_rules: PerJoint<PushRule>,

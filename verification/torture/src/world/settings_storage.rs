@@ -85,7 +85,7 @@ pub(super) struct StoredSettings {
 
 /// A settings storage with sectors of any size.
 pub(super) trait SettingsStorage: std::fmt::Debug {
-    /// Starts from the storage, with an optional power cut. `seed` decides how marginal bits read.
+    /// Powers up and reads the settings, with an optional power cut. `seed` decides the values of marginal bits.
     fn start(&mut self, seed: u64, cut: Option<Cut>) -> Check<PowerOutcome<StoredSettings>>;
     /// Saves settings, with an optional power cut.
     fn save(&mut self, image: &Image, cut: Option<Cut>) -> Check<PowerOutcome<Storage>>;

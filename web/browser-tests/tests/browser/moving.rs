@@ -172,7 +172,7 @@ fn a_hand_moves_a_limp_arm_and_it_falls_when_let_go() {
     let fallen = page.measured();
     assert!(fallen[2] > 100.0, "{fallen:?}");
     let from = on_the_upper_arm(&mut page);
-    // Away from the table.
+    // Forward: backward the linkage stops the forearm.
     let to = [from[0] + 60.0, from[1]];
     page.drag_and_hold(from, to);
     page.pass(1.0);
