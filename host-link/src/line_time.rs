@@ -25,13 +25,15 @@ pub fn time_on_line(baud: u32, bytes: usize) -> Duration {
 pub(crate) struct LineTime {
     baud: u32,
     busy_until: Instant,
+    /// When the last expected reply has arrived, if the arm answers at once.
+    replies_until: Instant,
     /// Replies may be this much later than due.
     allowance: Duration,
 }
 
 impl LineTime {
     pub(crate) const fn new(baud: u32) -> Self {
-        Self { baud, busy_until: Instant::ZERO, allowance: ROUND_TRIP }
+        Self { baud, busy_until: Instant::ZERO, replies_until: Instant::ZERO, allowance: ROUND_TRIP }
     }
 
     /// Notes that these bytes are sent at `now`, after all earlier bytes.
@@ -59,9 +61,11 @@ impl LineTime {
         self.allowance = Duration::from_micros(allowance.max(late).max(SHORTEST.as_micros()));
     }
 
-    /// When the last byte of the replies on their way has arrived, if the arm answers at once.
-    pub(crate) fn reply_due(&self, now: Instant, awaited_bytes: usize) -> Instant {
-        self.busy_until.max(now) + time_on_line(self.baud, awaited_bytes)
+    /// Notes that a reply of so many bytes follows the bytes sent so far. Returns when its last byte arrives, if the arm answers
+    /// at once and no reply before it was lost.
+    pub(crate) fn expect(&mut self, bytes: usize) -> Instant {
+        self.replies_until = self.replies_until.max(self.busy_until) + time_on_line(self.baud, bytes);
+        self.replies_until
     }
 }
 
@@ -86,8 +90,16 @@ mod tests {
         let now = Instant::from_micros(1_000);
         line.send(now, 7);
         assert_eq!((line.busy_until() - now).as_micros(), 608, "7 bytes of 10 bits");
-        assert_eq!((line.reply_due(now, 14) - now).as_micros(), 608 + 1_216);
+        assert_eq!((line.expect(14) - now).as_micros(), 608 + 1_216);
         line.send(now, 7);
         assert_eq!((line.busy_until() - now).as_micros(), 2 * 608, "behind the first");
+        assert_eq!((line.expect(14) - now).as_micros(), 608 + 2 * 1_216, "both ways at once");
+        let later = Instant::from_micros(100_000);
+        line.send(later, 7);
+        assert_eq!(
+            (line.expect(14) - later).as_micros(),
+            608 + 1_216,
+            "earlier replies have come or are lost"
+        );
     }
 }

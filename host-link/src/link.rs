@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 
 use protocol_core::registers::Map;
+use protocol_core::registers::map::DEVICE_CODE;
 use protocol_core::request::{Alarm, Request};
 use protocol_core::time::Instant;
 use protocol_core::wire::deframer::gap;
@@ -12,9 +13,14 @@ use protocol_core::wire::{Deframer, Frame, FrameBuffer, Function, ToHost};
 use crate::event::{HostEvent, RequestId};
 use crate::line_time::LineTime;
 use crate::open_reads::{OpenRead, OpenReads, Overdue, Patience};
-use crate::pending_reads::{Matched, PendingReads};
+use crate::pending_reads::{Matched, PendingReads, Wait};
 use crate::snapshot::Snapshot;
 use crate::span::Span;
+
+/// Markers that are sent for a read. If no reply to them comes, the read is sent all the same.
+const MOST_MARKERS: u32 = 3;
+/// The register that a marker reads, and some registers behind it.
+const MARKED: Span = Span::of(&DEVICE_CODE);
 
 /// The line, and what the arm may send without a request.
 #[derive(Clone, Copy, Debug)]
@@ -44,6 +50,7 @@ pub struct HostLink {
     queue: VecDeque<Queued>,
     open: OpenReads,
     pending: PendingReads,
+    markers: Markers,
     events: VecDeque<HostEvent>,
     last_id: RequestId,
     /// The number of writes that were sent; wraps.
@@ -63,6 +70,7 @@ impl HostLink {
             queue: VecDeque::new(),
             open: OpenReads::default(),
             pending: PendingReads::default(),
+            markers: Markers::NONE,
             events: VecDeque::new(),
             last_id: RequestId::default(),
             writes: 0,
@@ -100,6 +108,7 @@ impl HostLink {
         self.queue.retain(|queued| !matches!(queued, Queued::Read(read) if read.id == id));
         self.open.take(id);
         self.pending.give_up(id);
+        self.markers = Markers::NONE;
     }
 
     /// For a line that was opened or closed: ends all reads without a reply, and drops writes in the queue, events and received
@@ -156,10 +165,11 @@ impl HostLink {
     /// When [`HostEvent::Wait`] ends, if no bytes come.
     #[must_use]
     pub fn deadline(&self) -> Instant {
-        self.open.due().min(self.deframer.deadline().unwrap_or(Instant::FAR_FUTURE))
+        let deframer = self.deframer.deadline().unwrap_or(Instant::FAR_FUTURE);
+        self.open.due().min(deframer).min(self.markers.due)
     }
 
-    /// The next queued frame that may be sent. A read waits while another one on its way has the only possible range.
+    /// The next queued frame that may be sent, or a marker.
     fn next_frame(&mut self, now: Instant) -> Option<HostEvent> {
         let frame = match self.queue.pop_front()? {
             Queued::Write(frame) | Queued::WriteAhead(frame) => {
@@ -168,10 +178,13 @@ impl HostLink {
                 frame
             }
             Queued::Read(read) => match self.pending.range_for(read.id, read.wanted, self.options.reports) {
-                Some(asked) => self.send_read(now, read, asked),
-                None => {
+                Ok(asked) => self.send_read(now, read, asked),
+                Err(Wait::ForMarker) if self.markers.sent == MOST_MARKERS && self.markers.due <= now => {
+                    self.send_read(now, read, read.wanted)
+                }
+                Err(wait) => {
                     self.queue.push_front(Queued::Read(read));
-                    return None;
+                    return self.marker(now, wait).map(HostEvent::Send);
                 }
             },
         };
@@ -179,14 +192,29 @@ impl HostLink {
     }
 
     fn send_read(&mut self, now: Instant, mut read: OpenRead, asked: Span) -> Vec<u8> {
-        let frame = encoded(&Request::Read { address: asked.address(), count: asked.count() });
-        self.line.send(now, frame.len());
-        let awaited = self.awaited_bytes() + MIN_LENGTH + usize::from(asked.count());
-        let due = self.line.reply_due(now, awaited);
-        self.pending.add(read.id, asked, due);
+        self.markers = Markers::NONE;
+        let (frame, due) = self.ask(now, Some(read.id), asked);
         read.note_sent(due, self.line.allowance(), self.writes);
         self.open.push(read);
         frame
+    }
+
+    /// The marker that a read waits for, if one has to be sent now.
+    fn marker(&mut self, now: Instant, wait: Wait) -> Option<Vec<u8>> {
+        let is_due = wait == Wait::ForMarker && (self.markers.sent == 0 || self.markers.due <= now);
+        let asked = is_due.then(|| self.pending.free(MARKED, self.options.reports))??;
+        let (frame, due) = self.ask(now, None, asked);
+        self.markers = Markers { sent: self.markers.sent + 1, due: due + self.line.allowance() };
+        Some(frame)
+    }
+
+    /// The frame of a read, and when its reply is due; `None` as `id` for a marker.
+    fn ask(&mut self, now: Instant, id: Option<RequestId>, asked: Span) -> (Vec<u8>, Instant) {
+        let frame = encoded(&Request::Read { address: asked.address(), count: asked.count() });
+        self.line.send(now, frame.len());
+        let due = self.line.expect(MIN_LENGTH + usize::from(asked.count()));
+        self.pending.add(id, asked, due);
+        (frame, due)
     }
 
     fn end_attempt(&mut self, overdue: Overdue) {
@@ -207,7 +235,8 @@ impl HostLink {
                 Ok(Message::Other(event)) => self.events.push_back(event),
                 Err(defect) => {
                     self.events.push_back(HostEvent::Damaged(defect));
-                    if let Some(id) = self.pending.note_damage(self.heard_until) {
+                    let damaged = self.pending.note_damage(self.heard_until);
+                    if let Some(id) = damaged.filter(|&id| !self.pending.awaits(id)) {
                         self.open.note_damage(id, self.heard_until);
                     }
                 }
@@ -224,7 +253,9 @@ impl HostLink {
                 false => HostEvent::Unmatched(Function::Read, values),
             });
         };
-        self.line.note_reply(due, self.heard_until);
+        if let Some(due) = due {
+            self.line.note_reply(due, self.heard_until);
+        }
         for lost in lost.into_iter().filter(|&lost| Some(lost) != id) {
             self.lose(lost);
         }
@@ -249,6 +280,19 @@ impl HostLink {
             if read.may_repeat(self.writes) { Overdue::Repeat(read) } else { Overdue::GiveUp(read) };
         self.end_attempt(overdue);
     }
+}
+
+/// The markers that the read at the front of the queue waits for.
+#[derive(Clone, Copy, Debug)]
+struct Markers {
+    sent: u32,
+    /// When the reply to the last one is overdue.
+    due: Instant,
+}
+
+impl Markers {
+    /// No read waits for a marker.
+    const NONE: Self = Self { sent: 0, due: Instant::FAR_FUTURE };
 }
 
 /// The content of a frame.

@@ -12,7 +12,7 @@ use crate::span::Span;
 ///
 /// A read is repeated as soon as its reply is later than an allowance: twice the recent delay of replies, and
 /// [`ROUND_TRIP`] before the first reply. The time to the next repeat doubles, up to [`ROUND_TRIP`] or the allowance,
-/// whichever is longer. A read changes nothing, so a needless repeat does no harm. The read is given up `attempts` times
+/// whichever is longer. It is repeated at once if its reply comes damaged. A read changes nothing, so a needless repeat does no harm. The read is given up `attempts` times
 /// `timeout` after the reply to its first attempt was due. So a lost reply costs little time, several lost replies are no
 /// error, and a slow arm gets the whole time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

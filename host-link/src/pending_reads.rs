@@ -7,6 +7,8 @@
 //! * No two reads on their way have the same range: the second asks for a few registers more. This also keeps a read of the
 //!   present positions apart from a report ([D14](protocol_core::decisions#d14)).
 //! * A read that was given up stays in the list, so that its late reply is recognised.
+//! * Where no other range is left, a new read waits until it is known whether a reply to the old one comes: the reply to a
+//!   marker, a read of another range behind it, tells.
 
 use std::collections::VecDeque;
 
@@ -22,7 +24,7 @@ const REMEMBERED: usize = 64;
 /// A read that was sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct SentRead {
-    /// `None` once it was given up.
+    /// `None` once it was given up, and for a marker.
     id: Option<RequestId>,
     asked: Span,
     /// When its reply has arrived, if the arm answers at once.
@@ -40,26 +42,43 @@ pub(crate) struct PendingReads(VecDeque<SentRead>);
 pub(crate) struct Matched {
     /// The read that the reply answers; `None` if the read was given up.
     pub(crate) id: Option<RequestId>,
-    /// When the reply was due.
-    pub(crate) due: Instant,
+    /// When the reply was due; `None` if a later attempt has the same range, so that the reply may be to that one.
+    pub(crate) due: Option<Instant>,
     /// Reads that were sent before the answered one, oldest first: their replies are lost.
     pub(crate) lost: Vec<RequestId>,
 }
 
+/// Why a read has to wait.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Wait {
+    /// For the end of another read, which has asked for the only possible range.
+    ForRead,
+    /// For the reply to a marker: a read with the only possible range was given up.
+    ForMarker,
+}
+
 impl PendingReads {
     /// The range to ask for: the shortest one that holds `wanted`, and that neither a pending read nor one of `reports` has.
-    /// If no such range is left, it is `wanted` itself. A pending read with this range is then an earlier attempt or was
-    /// given up, and the first reply counts for it. `None` while another open read has asked for `wanted`.
-    pub(crate) fn range_for(&self, id: RequestId, wanted: Span, reports: &[Span]) -> Option<Span> {
-        let is_free = |span: &Span| !reports.contains(span) && !self.has(span, |_| true);
-        let wider = (0..=u8::MAX).map_while(|by| wanted.widened(by)).find(is_free);
-        let is_of_another = |read: &SentRead| read.id.is_some_and(|other| other != id);
-        wider.or_else(|| (!self.has(&wanted, is_of_another)).then_some(wanted))
+    /// If no such range is left, a repeat asks for `wanted` itself, and the first reply counts for the earlier attempt.
+    pub(crate) fn range_for(&self, id: RequestId, wanted: Span, reports: &[Span]) -> Result<Span, Wait> {
+        let is_repeat = |read: &SentRead| read.id == Some(id);
+        match self.free(wanted, reports) {
+            Some(free) => Ok(free),
+            None if self.has(&wanted, |read| read.id.is_some() && !is_repeat(read)) => Err(Wait::ForRead),
+            None if self.has(&wanted, is_repeat) => Ok(wanted),
+            None => Err(Wait::ForMarker),
+        }
     }
 
-    /// Adds a read that was sent. Its reply is due at `due`.
-    pub(crate) fn add(&mut self, id: RequestId, asked: Span, due: Instant) {
-        self.0.push_back(SentRead { id: Some(id), asked, due, is_damaged: false });
+    /// The shortest range that holds `wanted`, and that neither a pending read nor one of `reports` has.
+    pub(crate) fn free(&self, wanted: Span, reports: &[Span]) -> Option<Span> {
+        let is_free = |span: &Span| !reports.contains(span) && !self.has(span, |_| true);
+        (0..=u8::MAX).map_while(|by| wanted.widened(by)).find(is_free)
+    }
+
+    /// Adds a read that was sent; `None` for a marker. Its reply is due at `due`.
+    pub(crate) fn add(&mut self, id: Option<RequestId>, asked: Span, due: Instant) {
+        self.0.push_back(SentRead { id, asked, due, is_damaged: false });
     }
 
     /// Marks a read as given up or answered. Forgets the oldest such reads if there are more than [`REMEMBERED`].
@@ -81,7 +100,7 @@ impl PendingReads {
         let index = self.0.iter().position(|read| read.asked == range)?;
         let lost = self.0.drain(..index).filter_map(|read| read.id).collect();
         let SentRead { id, due, .. } = self.0.pop_front()?;
-        Some(Matched { id, due, lost })
+        Some(Matched { id, due: (!self.has(&range, |_| true)).then_some(due), lost })
     }
 
     /// A damaged frame came at `now`. It counts as the reply to the oldest awaited read, if that reply is due by then. Returns
@@ -92,9 +111,9 @@ impl PendingReads {
         read.id.filter(|_| read.is_damaged)
     }
 
-    /// Is a reply to this read still possible?
+    /// Is a reply to this read on its way?
     pub(crate) fn awaits(&self, id: RequestId) -> bool {
-        self.0.iter().any(|read| read.id == Some(id))
+        self.0.iter().any(|read| read.id == Some(id) && !read.is_damaged)
     }
 
     /// The ranges of the reads whose replies are on their way.
@@ -123,12 +142,12 @@ mod tests {
     }
 
     fn matched(id: Option<RequestId>, lost: Vec<RequestId>) -> Matched {
-        Matched { id, due: Instant::ZERO, lost }
+        Matched { id, due: Some(Instant::ZERO), lost }
     }
 
     fn add(pending: &mut PendingReads, id: RequestId, wanted: Span) -> Span {
         let asked = pending.range_for(id, wanted, REPORT).expect("a range");
-        pending.add(id, asked, Instant::ZERO);
+        pending.add(Some(id), asked, Instant::ZERO);
         asked
     }
 
@@ -148,7 +167,7 @@ mod tests {
     fn a_read_of_the_positions_differs_from_a_report() {
         assert_eq!(
             PendingReads::default().range_for(RequestId::default(), REPORT[0], REPORT),
-            Some(span(54, 8))
+            Ok(span(54, 8))
         );
     }
 
@@ -163,15 +182,19 @@ mod tests {
     }
 
     #[test]
-    fn a_range_without_a_wider_one_waits_for_the_read_before() {
+    fn a_range_without_a_wider_one_waits_for_the_read_before_and_for_a_marker() {
         let (mut pending, ids) = (PendingReads::default(), ids(2));
-        add(&mut pending, ids[0], span(0, 255));
-        assert_eq!(pending.range_for(ids[1], span(0, 255), &[]), None);
-        assert_eq!(pending.range_for(ids[0], span(0, 255), &[]), Some(span(0, 255)), "another attempt");
+        let all = span(0, 255);
+        add(&mut pending, ids[0], all);
+        assert_eq!(pending.range_for(ids[1], all, &[]), Err(Wait::ForRead));
+        assert_eq!(add(&mut pending, ids[0], all), all, "another attempt");
+        let first = Matched { due: None, ..matched(Some(ids[0]), vec![]) };
+        assert_eq!(pending.take(all), Some(first), "the time of no attempt is learned");
         pending.give_up(ids[0]);
-        assert_eq!(add(&mut pending, ids[1], span(0, 255)), span(0, 255));
-        assert_eq!(pending.take(span(0, 255)), Some(matched(None, vec![])), "the late one");
-        assert_eq!(pending.take(span(0, 255)), Some(matched(Some(ids[1]), vec![])));
+        assert_eq!(pending.range_for(ids[1], all, &[]), Err(Wait::ForMarker));
+        pending.add(None, span(0, 1), Instant::ZERO);
+        assert_eq!(pending.take(span(0, 1)), Some(matched(None, vec![])), "no reply to the second attempt");
+        assert_eq!(pending.range_for(ids[1], all, &[]), Ok(all));
     }
 
     #[test]

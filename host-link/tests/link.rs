@@ -85,6 +85,123 @@ fn a_damaged_reply_is_asked_for_again_at_once_and_so_are_its_repeats() {
 }
 
 #[test]
+fn damaged_frames_repeat_a_read_once_for_each_reply_that_is_due() {
+    let mut link = link(115_200);
+    link.read(span(29, 3), PATIENCE);
+    sent(&mut link, at_ms(0));
+    link.bytes(at_ms(2), &[damaged(), damaged()].concat());
+    let (happened, _) = events(&mut link, at_ms(2));
+    assert!(
+        matches!(happened.as_slice(), [HostEvent::Damaged(_), HostEvent::Damaged(_), HostEvent::Send(_)]),
+        "{happened:?}"
+    );
+    link.bytes(at_ms(3), &damaged());
+    let (happened, _) = events(&mut link, at_ms(3));
+    assert!(matches!(happened.as_slice(), [HostEvent::Damaged(_)]), "the repeat is due later: {happened:?}");
+}
+
+#[test]
+fn a_damaged_reply_does_not_lengthen_the_time_to_the_next_repeat() {
+    let mut link = link(115_200);
+    in_time(&mut link);
+    link.read(span(29, 3), PATIENCE);
+    sent(&mut link, at_ms(800));
+    for when in [802, 804, 806] {
+        link.bytes(at_ms(when), &damaged());
+        assert_eq!(events(&mut link, at_ms(when)).0.len(), 2);
+    }
+    let (repeated, when) = next_after_silence(&mut link, at_ms(806));
+    assert!(matches!(repeated.as_slice(), [HostEvent::Send(_)]), "{repeated:?}");
+    assert!(when < at_ms(813), "{when:?}");
+}
+
+#[test]
+fn the_first_of_two_reads_is_repeated_if_its_reply_is_damaged_and_not_behind_a_write() {
+    for writes in [0, 1] {
+        let mut link = link(115_200);
+        let (first, second) = (link.read(span(29, 3), PATIENCE), link.read(span(240, 16), PATIENCE));
+        (0..writes).for_each(|_| link.write(Map::V22, 29, &[2]));
+        assert_eq!(events(&mut link, at_ms(0)).0.len(), 2 + writes);
+        link.bytes(at_ms(2), &damaged());
+        let (happened, _) = events(&mut link, at_ms(2));
+        assert_eq!(happened.len(), 2 - writes, "no read is repeated behind a write: {happened:?}");
+        link.bytes(at_ms(5), &reply(240, &[9; 16]));
+        let (happened, _) = events(&mut link, at_ms(5));
+        let lost = (writes == 1).then_some(HostEvent::NoReply(first, span(29, 3)));
+        let ends: Vec<_> = lost.into_iter().chain([replied(second, 240, &[9; 16])]).collect();
+        assert_eq!(happened, ends);
+    }
+}
+
+/// The registers that an arm sends as the reply to this read.
+fn answered(request: &[u8]) -> Vec<u8> {
+    reply(request[3], &vec![7; usize::from(request[4])])
+}
+
+#[test]
+fn a_read_of_all_registers_is_answered_at_once_after_one_that_lost_a_reply() {
+    for is_damaged in [false, true] {
+        let mut link = link(115_200);
+        let (all, mut now) = (span(0, 255), at_ms(0));
+        let mut is_lost = true;
+        for turn in 0..20 {
+            let id = link.read(all, PATIENCE);
+            let (mut is_answered, start) = (false, now);
+            while !is_answered {
+                let (happened, until) = events(&mut link, now);
+                if happened.is_empty() {
+                    now = until;
+                    link.bytes(now, &[]);
+                }
+                for event in happened {
+                    match event {
+                        HostEvent::Send(request) => {
+                            let mut reply = answered(&request);
+                            now = now + Duration::from_micros(87 * (7 + reply.len() as u64) + 300);
+                            match (std::mem::take(&mut is_lost), is_damaged) {
+                                (true, true) => reply[100] ^= 1,
+                                (true, false) => continue,
+                                _ => {}
+                            }
+                            link.bytes(now, &reply);
+                        }
+                        HostEvent::Reply(replied, _) => is_answered = replied == id,
+                        HostEvent::Damaged(_) | HostEvent::Unmatched(..) => {}
+                        other => panic!("{other:?}"),
+                    }
+                }
+            }
+            let took = (now - start).as_micros() / 1_000;
+            let most = [160, 40, 25][turn.min(2)];
+            assert!(took <= most, "turn {turn} took {took} ms, a reply was damaged: {is_damaged}");
+        }
+    }
+}
+
+#[test]
+fn a_read_of_all_registers_ends_although_no_marker_is_answered() {
+    let mut link = link(115_200);
+    let patience = Patience { attempts: 1, timeout: Duration::from_millis(500) };
+    let (mut now, mut ended) = (at_ms(0), Vec::new());
+    for _ in 0..2 {
+        let id = link.read(span(0, 255), patience);
+        while !ended.contains(&id) {
+            let (happened, until) = events(&mut link, now);
+            ended.extend(happened.into_iter().filter_map(|event| match event {
+                HostEvent::NoReply(id, _) => Some(id),
+                _ => None,
+            }));
+            if !ended.contains(&id) {
+                now = until;
+                link.bytes(now, &[]);
+            }
+        }
+    }
+    // The second read begins 0.3 s later, after three markers.
+    assert!((at_ms(1_300)..at_ms(1_500)).contains(&now), "{now:?}");
+}
+
+#[test]
 fn a_damaged_frame_before_the_reply_is_due_is_another_one() {
     let mut link = link(115_200);
     let id = link.read(span(29, 3), PATIENCE);
@@ -113,15 +230,20 @@ fn a_damaged_frame_beside_the_reply_costs_a_needless_read_and_no_reply() {
     }
 }
 
+/// Forty reads in 800 ms, whose replies come in time.
+fn in_time(link: &mut HostLink) {
+    for turn in 0..40 {
+        link.read(span(29, 3), PATIENCE);
+        sent(link, at_ms(turn * 20));
+        link.bytes(at_ms(turn * 20 + 2), &reply(29, &[1, 2, 3]));
+        events(link, at_ms(turn * 20 + 2));
+    }
+}
+
 #[test]
 fn a_lost_reply_costs_little_on_a_line_that_is_in_time_and_several_are_no_error() {
     let mut link = link(115_200);
-    for turn in 0..40 {
-        link.read(span(29, 3), PATIENCE);
-        sent(&mut link, at_ms(turn * 20));
-        link.bytes(at_ms(turn * 20 + 2), &reply(29, &[1, 2, 3]));
-        events(&mut link, at_ms(turn * 20 + 2));
-    }
+    in_time(&mut link);
     let (start, id) = (at_ms(800), link.read(span(29, 3), PATIENCE));
     sent(&mut link, start);
     let (mut now, mut times) = (start, Vec::new());

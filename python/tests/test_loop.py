@@ -34,7 +34,7 @@ def turns_on_time(damaged_percent: float, seed: int) -> int:
     return made
 
 
-@pytest.mark.parametrize(("damaged_percent", "share"), [(0, 1.0), (0.05, 0.99), (0.5, 0.9)])
+@pytest.mark.parametrize(("damaged_percent", "share"), [(0, 1.0), (0.05, 0.995), (0.5, 0.97)])
 def test_damaged_bytes_cost_a_loop_few_turns(damaged_percent: float, share: float) -> None:
     made = [turns_on_time(damaged_percent, seed) for seed in (1, 2, 3)]
     assert min(made) >= share * TURNS, made

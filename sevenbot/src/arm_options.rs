@@ -19,7 +19,7 @@ pub struct ArmOptions {
     pub baud: u32,
     /// The timeout of one attempt. A read fails after `attempts` times this.
     pub reply_timeout: Duration,
-    /// Attempts for a read, at least one. With more than one, a read is sent again whenever its reply is overdue, so a lost
+    /// Attempts for a read, at least one. With more than one, a read is sent again whenever its reply is overdue or damaged, so a lost
     /// reply costs much less than `reply_timeout`: [`Patience`](host_link::Patience). A read changes nothing, so repeating it is
     /// safe.
     pub attempts: u32,
