@@ -14,7 +14,7 @@ use crate::bulk;
 use crate::errors::{InvalidType, NotServed, raised, without_attribute};
 use crate::motion::{self, PlayOptions, RecordOptions, TipWish};
 use crate::numbers::{Angles, Values, duration, seed};
-use crate::observation::{Answer, Observation};
+use crate::observation::{Answer, Observation, monotonic};
 use crate::opening::{self, Opened};
 use crate::ports::{self, Wanted};
 use crate::recording::Recording;
@@ -155,10 +155,11 @@ impl Arm {
 
     #[doc = include_str!("arm/help/observe.txt")]
     fn observe(&self, py: Python<'_>) -> PyResult<Observation> {
+        let asked = monotonic(py)?;
         let read = raised(py, self.worker.read(py, Answer::read)?)?;
         let served =
             read.ok_or_else(|| NotServed::of_arm(py, "positions in hundredths, velocities and loads"));
-        served?.observation(py)
+        served?.observation(py, asked)
     }
 
     #[doc = include_str!("arm/help/is_connected.txt")]

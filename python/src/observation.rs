@@ -47,22 +47,27 @@ impl Answer {
         Ok(Some(Self { state, time: time.as_secs_f64(), age: CYCLE + waited, came: Instant::now() }))
     }
 
-    /// The observation, with the time of the answer on the clock of Python.
-    pub(crate) fn observation(self, py: Python<'_>) -> PyResult<Observation> {
+    /// The observation. `asked` is a time before the request, on Python's clock, which has steps of 16 ms on some systems.
+    pub(crate) fn observation(self, py: Python<'_>, asked: f64) -> PyResult<Observation> {
         let tenths = |values: [i16; 7]| values.map(|value| f64::from(value) / 10.0);
         // Read this before Python's clock. If the thread waits between the two, the result is later than the answer, but not
-        // later than now, and never earlier than the request.
+        // later than now.
         let since = self.came.elapsed().as_secs_f64();
-        let now: f64 = py.import("time")?.call_method0("monotonic")?.extract()?;
+        let now = monotonic(py)?;
         Ok(Observation {
             positions: self.state.positions.map(|angle| angle.map_or(f64::NAN, FineAngle::degrees)),
             velocities: tenths(self.state.velocities),
             loads: tenths(self.state.loads),
             time: self.time,
             age: self.age,
-            monotonic: now - since,
+            monotonic: asked.max(now - since),
         })
     }
+}
+
+/// `time.monotonic()`.
+pub(crate) fn monotonic(py: Python<'_>) -> PyResult<f64> {
+    py.import("time")?.call_method0("monotonic")?.extract()
 }
 
 #[pymethods]

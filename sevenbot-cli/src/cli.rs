@@ -103,7 +103,7 @@ pub(crate) struct Global {
     /// Baud rate of the port. The arm starts with the rate in its register 12.
     #[arg(long, global = true, default_value_t = 115_200, value_parser = value_parser!(u32).range(1_200..=4_000_000))]
     pub(crate) baud: u32,
-    /// Timeout for an answer in milliseconds. An overdue question is sent again, for up to three times this long.
+    /// Timeout for an answer in milliseconds. A question whose answer is overdue or damaged is sent again, for up to three times this long.
     #[arg(long, global = true, value_name = "MS", env = "SEVENBOT_TIMEOUT", hide_env_values = true,
           default_value_t = 500, value_parser = value_parser!(u16).range(1..))]
     pub(crate) timeout: u16,

@@ -4,7 +4,7 @@
 //! result is there.
 
 use std::fs::{self, File};
-use std::io::{self, IsTerminal, Write};
+use std::io::{self, IsTerminal, Stdout, Write};
 use std::path::{Path, PathBuf};
 
 use crate::command_error::CommandError;
@@ -53,16 +53,17 @@ impl OutputFile {
     }
 }
 
-/// Writes the content of a file to standard output, unchanged: the printer would remove escape sequences from it. `binary` is
-/// the name of the format if a terminal cannot show it. Then the function fails if standard output is a terminal.
-pub(crate) fn write_to_stdout(content: &[u8], binary: Option<&str>) -> Result<(), CommandError> {
-    let mut stdout = io::stdout();
-    if let Some(name) = binary.filter(|_| stdout.is_terminal()) {
-        let advice = format!("a terminal cannot show {name}: write it to a file, or redirect the output");
-        return Err(CommandError::Usage(advice));
+/// Standard output for the content of a file, unchanged: the printer would remove escape sequences from it. The name of a
+/// `binary` format, which a terminal cannot show, is for the error.
+pub(crate) fn stdout_for(binary: Option<&str>) -> Result<Stdout, CommandError> {
+    let stdout = io::stdout();
+    match binary.filter(|_| stdout.is_terminal()) {
+        None => Ok(stdout),
+        Some(name) => {
+            let advice = "write it to a file, or redirect the output";
+            Err(CommandError::Usage(format!("a terminal cannot show {name}: {advice}")))
+        }
     }
-    stdout.write_all(content)?;
-    Ok(stdout.flush()?)
 }
 
 impl Drop for OutputFile {

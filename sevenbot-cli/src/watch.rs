@@ -4,7 +4,7 @@ use sevenbot::fine::FineTargets;
 use sevenbot::moves::{JointMove, Observer, PaceBefore, Stage};
 use sevenbot::recording::{Moment, Recording};
 use sevenbot::register_text::joints;
-use sevenbot::{Arm, Speed};
+use sevenbot::{Arm, Firmware, MoveTime};
 
 use crate::command_error::CommandError;
 use crate::interrupt::Interrupt;
@@ -51,18 +51,21 @@ pub(crate) fn note_rounding(begun: &JointMove) {
     }
 }
 
-/// Tells the user which joints will not move at the default speed, because a command left them another one: on purpose, or
-/// because it was killed before it could put the old speed back.
+/// Tells the user which joints do not move at the default speed: their registers were set on purpose, or a command was killed
+/// before it could put them back. Not on the maker's firmware, which has other defaults.
 pub(crate) fn note_other_pace(arm: &mut Arm, targets: &FineTargets) -> Result<(), CommandError> {
-    for (bits, pace) in PaceBefore::read(arm, targets)?.other_than_default() {
-        let speed = pace.speed.map_or(0.0, Speed::degrees_per_second);
-        let speed = match pace.time {
-            Some(time) => format!("{:.1} s for each move", time.duration().as_secs_f64()),
-            None => format!("{speed:.1} degrees/s"),
-        };
+    if arm.identity().firmware() != Firmware::Ours {
+        return Ok(());
+    }
+    let others = PaceBefore::read(arm, targets)?.other_than_default();
+    let paces = others.into_iter().map(|(bits, speed, time)| match time {
+        MoveTime::NONE => format!("{}: {:.1} degrees/s", joints(bits), speed.degrees_per_second()),
+        time => format!("{}: {:.1} s for each move", joints(bits), time.duration().as_secs_f64()),
+    });
+    let paces = paces.collect::<Vec<_>>().join("; ");
+    if !paces.is_empty() {
         note(format_args!(
-            "{}: {speed}, as an earlier command left it; `sevenbot set speed 60` sets the default of 114 degrees/s",
-            joints(bits)
+            "{paces}, as the registers of speed and duration say; `sevenbot set speed 60` sets the default of 114 degrees/s"
         ));
     }
     Ok(())

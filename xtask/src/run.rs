@@ -79,7 +79,7 @@ pub(crate) fn build_image() -> TaskResult {
 
 /// Builds the image, and runs an example of the crate `emulator` that measures it.
 pub(crate) fn experiment(name: &str) -> TaskResult {
-    build_image()?;
+    emulator::need_qemu().and_then(|()| build_image())?;
     cargo(&format!("run --quiet -p emulator --example {name}"))
 }
 

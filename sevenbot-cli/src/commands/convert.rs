@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use crate::command_error::CommandError;
 use crate::input_file;
-use crate::output_file::{ForceArg, OutputFile, write_to_stdout};
+use crate::output_file::{ForceArg, OutputFile, stdout_for};
 use crate::printer::Printable;
 use crate::session::Session;
 
@@ -82,6 +82,7 @@ pub(crate) fn run(session: &mut Session, args: &ConvertArgs) -> Result<(), Comma
     let is_stdout = args.output.as_os_str() == "-";
     let file = (!is_stdout).then(|| OutputFile::open(&args.output, Some(&args.input), args.force));
     let file = file.transpose()?;
+    let mut stdout = stdout_for((is_stdout && format == Format::Mcap).then_some("mcap"))?;
     let mut bytes = Vec::new();
     let (recording, damage) = match convert(input_file::open(&args.input)?, format, &mut bytes) {
         Ok(recording) => (recording, None),
@@ -89,7 +90,10 @@ pub(crate) fn run(session: &mut Session, args: &ConvertArgs) -> Result<(), Comma
         Err(error) => return Err(CommandError::file(&args.input, error)),
     };
     match file {
-        None => write_to_stdout(&bytes, (format == Format::Mcap).then_some("mcap"))?,
+        None => {
+            stdout.write_all(&bytes)?;
+            stdout.flush()?;
+        }
         Some(file) => {
             file.write(&bytes)?;
             let moments = recording.moments().count();

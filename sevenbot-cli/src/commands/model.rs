@@ -1,12 +1,12 @@
 //! `model`: the arm's model for robotics programs, to standard output or a file.
 
-use std::io;
+use std::io::{self, Write};
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
 use crate::command_error::CommandError;
-use crate::output_file::{ForceArg, OutputFile, write_to_stdout};
+use crate::output_file::{ForceArg, OutputFile, stdout_for};
 
 /// Write the arm's model: URDF, MJCF or glTF.
 #[derive(Debug, Args)]
@@ -61,5 +61,7 @@ pub(crate) fn run(args: &ModelArgs) -> Result<(), CommandError> {
     if let Some(path) = &args.out {
         return OutputFile::open(path, None, args.force)?.write(&bytes);
     }
-    write_to_stdout(&bytes, (args.format == ModelFormat::Glb).then_some("glb"))
+    let mut stdout = stdout_for((args.format == ModelFormat::Glb).then_some("glb"))?;
+    stdout.write_all(&bytes)?;
+    Ok(stdout.flush()?)
 }

@@ -244,8 +244,10 @@ fn put_back<T>(
     reached: &Result<T, CommandError>,
 ) -> Result<(), CommandError> {
     let restored = match reached {
-        // The arm holds. Do not wait: the duration of the move to the held position may still run.
-        Err(CommandError::Interrupted) => before.put_back_at_once(arm),
+        // The arm was told to hold. Do not wait: the duration of the move to the held position may still run.
+        Err(CommandError::Interrupted | CommandError::Problems(_)) if Interrupt::is_requested() => {
+            before.put_back_at_once(arm)
+        }
         _ => before.put_back(arm),
     };
     match restored {

@@ -65,25 +65,23 @@ impl PaceBefore {
         Ok(Self { registers, joints: joints_of(targets) })
     }
 
-    /// The paces of the joints whose speed is not the default. A move that sets no pace has these. Each pace comes with its
-    /// joints, as [`Joint::bit`](crate::Joint::bit)s.
+    /// The speeds other than the default, and the durations that apply with them: what a move has that sets no pace. Each pair
+    /// comes with its joints, as [`Joint::bit`](crate::Joint::bit)s.
     #[must_use]
-    pub fn other_than_default(&self) -> Vec<(u8, Pace)> {
+    pub fn other_than_default(&self) -> Vec<(u8, Speed, MoveTime)> {
         let (speeds, times) = (self.registers.joints(&SPEED), self.registers.joints(&TIME));
-        let by_default = Speed::from_steps(SPEED.default_at(SPEED.address));
-        let mut others: Vec<(u8, Pace)> = Vec::new();
-        for ((joint, speed), time) in Joint::ALL.into_iter().zip(speeds).zip(times) {
-            let speed = Speed::from_steps(speed);
-            if self.joints & joint.bit() == 0 || speed == by_default {
+        let mut others: Vec<(u8, Speed, MoveTime)> = Vec::new();
+        for ((joint, steps), time) in Joint::ALL.into_iter().zip(speeds).zip(times) {
+            let is_default = steps == SPEED.default_at(SPEED.of(joint));
+            let pace = Speed::from_steps(steps).zip(MoveTime::from_steps(time));
+            let Some((speed, time)) = pace.filter(|_| !is_default && self.joints & joint.bit() != 0) else {
                 continue;
-            }
+            };
             // A duration applies at the maximum speed only (D11).
-            let time = MoveTime::from_steps(time)
-                .filter(|time| speed == Some(Speed::MAXIMUM) && *time != MoveTime::NONE);
-            let pace = Pace { speed, time };
-            match others.iter_mut().find(|(_, other)| *other == pace) {
-                Some((joints, _)) => *joints |= joint.bit(),
-                None => others.push((joint.bit(), pace)),
+            let time = if speed == Speed::MAXIMUM { time } else { MoveTime::NONE };
+            match others.iter_mut().find(|other| (other.1, other.2) == (speed, time)) {
+                Some((joints, ..)) => *joints |= joint.bit(),
+                None => others.push((joint.bit(), speed, time)),
             }
         }
         others

@@ -109,13 +109,14 @@ pub(super) fn each_sample(
     let start = Instant::now();
     let (mut due, mut told) = (start, Vec::new());
     for _ in 0..count {
-        if Interrupt::is_requested() {
-            return Ok(());
-        }
         sleep(due.saturating_duration_since(Instant::now()));
         // After a late sample the next period begins now, instead of catching up.
         due = (due + period).max(Instant::now());
-        let sample = ArmSample::take(arm, start)?;
+        let sample = ArmSample::take(arm, start);
+        if Interrupt::is_requested() {
+            return Ok(());
+        }
+        let sample = sample?;
         warn_of_problems(&sample.health, &mut told);
         take(sample)?;
     }

@@ -189,7 +189,7 @@ fn ends_at(recording: &str, state: &Value) -> bool {
 /// The first line of an error or a warning, or else the first line, without what differs from run to run.
 fn first_words(text: &str, port: &str, folder: &Path) -> String {
     // The set-up makes the arm slow, and the tool prints a note about it. Leave the note out.
-    let text = || text.lines().filter(|line| !line.contains("as an earlier command left it"));
+    let text = || text.lines().filter(|line| !line.contains("as the registers of speed and duration say"));
     let begins = |word: &'static str| text().find(move |line| line.starts_with(word));
     let line = begins("error:").or_else(|| begins("warning:")).or_else(|| text().next()).unwrap_or_default();
     let line = line.replace(port, "PORT").replace(folder.to_str().expect("text"), "FOLDER");

@@ -85,6 +85,25 @@ fn a_pose_for_a_silent_joint_moves_nothing() {
     succeeded(rig.run(&["pose", "100", "_", "_", "_", "_", "_", "_", "--wait"]));
 }
 
+/// The hold reports the silent joint, and the duration is put back all the same.
+#[test]
+fn ctrl_c_puts_the_duration_back_although_a_joint_is_silent() {
+    let rig = Rig::start();
+    let mut tool = tool();
+    tool.arg("--port").arg(&rig.0.ports[0]).args(["pose", "170", "_", "_", "_", "_", "_", "_"]);
+    let tool = RunningProgram::spawn(tool.args(["--time", "8s", "--wait"]).stderr(Stdio::piped()));
+    wait_until("the arm moves", || rig.angles()[0] > 92.0);
+    rig.0.says(&["fault", "3=missing"]);
+    send_signal(&tool, Signal::INT);
+    let text = failed(&tool.output(), 1);
+    assert!(
+        text.contains("joint 3 does not answer") && !text.contains("still those of this command"),
+        "{text}"
+    );
+    let pace = succeeded(rig.run(&["get", "speed.1", "time.1"]));
+    assert_eq!((&*words(&pace, "32")[2], &*words(&pace, "39")[2]), ("60", "0"), "{pace}");
+}
+
 #[test]
 fn a_pose_that_ends_at_a_blocked_joint_names_the_joints_that_still_move() {
     let rig = Rig::start();
