@@ -324,7 +324,7 @@ mod tests {
         assert!(text.starts_with("The movement ended early. Joint 3 does not answer"), "{text}");
         let away =
             PlayFailure::NotReached(sevenbot::Joint::ALL[..2].iter().map(|&joint| (joint, 1, 9)).collect());
-        assert!(play_failure(Language::English, &away).ends_with("these joints: 1, 2"));
+        assert!(play_failure(Language::English, &away).ends_with("what holds them: 1, 2"));
     }
 
     #[test]

@@ -47,10 +47,10 @@ at once. A later move without --speed and --time keeps them, and a note says so.
 After Ctrl-C the arm holds its position.
 
 Exit status 1 if the arm did not take the pose, or with --wait did not reach it.
-If the outcome is unknown, a message says that the arm may be moving. Exit status
-3 if the connection is lost. A joint that does not answer or has let go takes no
-pose: nothing is sent then, and the message tells what to do. With --wait a
-joint that is blocked on its way ends the wait.")]
+If the outcome is unknown, a message says that the arm may be moving. Exit
+status 3 if the connection is lost. A joint that does not answer or has let go
+takes no pose: nothing is sent then, and the message tells what to do. With
+--wait a joint that is blocked on its way ends the wait.")]
 pub(crate) struct PoseArgs {
     /// Joints 1 to 7: degrees from 0 to 180, up to two decimals; +N or -N for a step from the present target; _ or . for no change.
     #[arg(value_names = ["A1", "A2", "A3", "A4", "A5", "A6", "A7"], num_args = 7, required = true,
