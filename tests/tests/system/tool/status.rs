@@ -101,7 +101,7 @@ fn ctrl_c_puts_the_duration_back_although_a_joint_is_silent() {
         "{text}"
     );
     let pace = succeeded(rig.run(&["get", "speed.1", "time.1"]));
-    assert_eq!((&*words(&pace, "32")[2], &*words(&pace, "39")[2]), ("60", "0"), "{pace}");
+    assert_eq!([words(&pace, "32")[2], words(&pace, "39")[2]], ["60", "0"], "{pace}");
 }
 
 #[test]
