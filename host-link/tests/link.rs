@@ -101,6 +101,18 @@ fn damaged_frames_repeat_a_read_once_for_each_reply_that_is_due() {
 }
 
 #[test]
+fn a_damaged_late_reply_repeats_nothing_while_a_repeat_is_on_its_way() {
+    let mut link = link(115_200);
+    link.read(span(29, 3), PATIENCE);
+    sent(&mut link, at_ms(0));
+    let (repeated, when) = next_after_silence(&mut link, at_ms(0));
+    assert!(matches!(repeated.as_slice(), [HostEvent::Send(_)]), "{repeated:?}");
+    link.bytes(when, &damaged());
+    let (happened, _) = events(&mut link, when);
+    assert!(matches!(happened.as_slice(), [HostEvent::Damaged(_)]), "{happened:?}");
+}
+
+#[test]
 fn a_damaged_reply_does_not_lengthen_the_time_to_the_next_repeat() {
     let mut link = link(115_200);
     in_time(&mut link);
