@@ -1,24 +1,19 @@
 //! Properties of a link, on random schedules of requests and faults. Proptest prints the seed of a failure.
 
-#![allow(clippy::expect_used, clippy::indexing_slicing, clippy::panic)] // A panic is a failed test.
-
 use std::collections::{BTreeMap, VecDeque};
 
-use host_link::{HostEvent, HostLink, LinkOptions, Patience, RequestId, Span};
+use host_link::{HostEvent, HostLink, Patience, RequestId, Span};
 use proptest::collection::vec;
 use proptest::prelude::*;
 use protocol_core::registers::Map;
-use protocol_core::request::{Reply, Request};
+use protocol_core::request::Request;
 use protocol_core::time::{Duration, Instant};
-use protocol_core::wire::{Deframer, FrameBuffer, ToArm};
+use protocol_core::wire::{Deframer, ToArm};
 
-const REPORT: Span = Span::of(&protocol_core::registers::map::PRESENT_POSITION);
+use crate::common::{POSITIONS, link, reply};
+
 /// The value of every register in a report.
 const IN_REPORT: u8 = 255;
-
-fn new_link() -> HostLink {
-    HostLink::new(LinkOptions { baud: 115_200, reports: &[REPORT] })
-}
 
 /// Ranges of registers. Some cannot be widened.
 fn spans() -> impl Strategy<Value = Span> {
@@ -26,12 +21,6 @@ fn spans() -> impl Strategy<Value = Span> {
     proptest::sample::select(
         usual.map(|(address, count)| Span::new(address, count).expect("a span")).to_vec(),
     )
-}
-
-fn reply(address: u8, values: &[u8]) -> Vec<u8> {
-    let mut frame = FrameBuffer::new();
-    Reply { address, values }.encode(&mut frame);
-    frame.to_vec()
 }
 
 /// What happens to the answer of a read.
@@ -145,7 +134,7 @@ impl World {
                     self.link.cancel(id);
                 }
             }
-            Action::Report => self.arm.send(self.now, reply(REPORT.address(), &[IN_REPORT; 7])),
+            Action::Report => self.arm.send(self.now, reply(POSITIONS.address(), &[IN_REPORT; 7])),
             Action::Pass(millis) => self.run_until(self.now + Duration::from_millis(millis)),
         }
         self.poll();
@@ -192,7 +181,7 @@ impl World {
 
 /// The events of a link after the same two reads, for bytes that come in these pieces.
 fn events_of(pieces: &[&[u8]]) -> Vec<HostEvent> {
-    let mut link = new_link();
+    let mut link = link(115_200);
     let patience = Patience { attempts: 1, timeout: Duration::from_millis(500) };
     for span in [Span::new(10, 4), Span::new(240, 16)].into_iter().flatten() {
         link.read(span, patience);
@@ -234,7 +223,7 @@ proptest! {
         fates in vec(fates(), 0..60),
     ) {
         let arm = Arm::new(fates);
-        let (link, open) = (new_link(), BTreeMap::new());
+        let (link, open) = (link(115_200), BTreeMap::new());
         let mut world = World { link, arm, now: Instant::ZERO, writes: 0, open, answered: 0 };
         for action in actions {
             world.act(action);
@@ -244,7 +233,7 @@ proptest! {
         // The line is good again.
         world.arm.fates.clear();
         let before = world.answered;
-        world.act(Action::Read(REPORT, 3));
+        world.act(Action::Read(POSITIONS, 3));
         world.run_until(world.now + Duration::from_millis(1_000));
         prop_assert_eq!(world.answered, before + 1);
     }
@@ -267,13 +256,13 @@ proptest! {
     fn any_bytes_are_survived(pieces in vec((vec(any::<u8>(), 0..300), 0..200_000_u64), 0..20)) {
         let arm = Arm::new(Vec::new());
         let mut world =
-            World { link: new_link(), arm, now: Instant::ZERO, writes: 0, open: BTreeMap::new(), answered: 0 };
+            World { link: link(115_200), arm, now: Instant::ZERO, writes: 0, open: BTreeMap::new(), answered: 0 };
         for (bytes, micros) in pieces {
             world.now = world.now + Duration::from_micros(micros);
             world.link.bytes(world.now, &bytes);
             while !matches!(world.link.poll(world.now), HostEvent::Wait(_)) {}
         }
-        world.act(Action::Read(REPORT, 3));
+        world.act(Action::Read(POSITIONS, 3));
         world.run_until(world.now + Duration::from_millis(2_000));
         prop_assert_eq!(world.answered, 1);
     }
