@@ -11,7 +11,7 @@ use sevenbot::recording::{FileVersion, Moment, RecordingLines};
 
 use crate::command_error::CommandError;
 use crate::line_file::LineFile;
-use crate::output_file::is_same;
+use crate::output_file::{is_same, stdout_for};
 use crate::printer::note;
 
 /// The files of a recording. All of them get the same moments.
@@ -116,7 +116,7 @@ impl Outputs {
 impl McapFile {
     fn create(path: &Path) -> Result<Self, CommandError> {
         let out: Box<dyn Write> = match is_stdout(path) {
-            true => Box::new(io::stdout()),
+            true => Box::new(stdout_for(Some("mcap"))?),
             false => Box::new(File::create(path).map_err(|error| CommandError::file(path, error))?),
         };
         // A pipe is read while it is written, so it needs each message at once.

@@ -10,6 +10,7 @@ use super::output::{failed, run_without_arm, succeeded};
 use system_tests::process::{RunningProgram, Signal, send_signal};
 use system_tests::programs::{TOOL_TIMEOUT, sevenbot, tool};
 use system_tests::registers::FEEDBACK_FREQUENCY;
+use system_tests::terminal::Terminal;
 use system_tests::wait::wait_until;
 use system_tests::{TestSetup, with_arm};
 
@@ -69,6 +70,17 @@ fn a_program_reads_a_recording_while_it_is_written() {
         let piped = run_without_arm(&["convert", text(&live), "-", "--to", "mcap"]);
         assert_eq!(piped.stdout, fs::read(&whole).expect("MCAP"), "the same bytes through a pipe");
     });
+}
+
+#[test]
+fn a_terminal_gets_no_bytes_of_a_binary_format() {
+    let (_folder, wave) = file("wave.txt", WAVE);
+    let record = ["--port", "sim", "record", "--mcap", "-", "--driven"];
+    for command in [&record[..], &["convert", text(&wave), "-", "--to", "mcap"]] {
+        let mut terminal = Terminal::run(sevenbot(), command);
+        assert_eq!(terminal.wait().code(), Some(2), "{command:?}: {}", terminal.contents());
+        assert!(terminal.contents().contains("a terminal cannot show mcap"), "{}", terminal.contents());
+    }
 }
 
 #[test]
