@@ -4,7 +4,7 @@ use sevenbot::fine::FineTargets;
 use sevenbot::moves::{JointMove, Observer, PaceBefore, Stage};
 use sevenbot::recording::{Moment, Recording};
 use sevenbot::register_text::joints;
-use sevenbot::{Arm, Firmware, MoveTime};
+use sevenbot::{Arm, Firmware, MoveTime, Speed};
 
 use crate::command_error::CommandError;
 use crate::interrupt::Interrupt;
@@ -64,8 +64,10 @@ pub(crate) fn note_other_pace(arm: &mut Arm, targets: &FineTargets) -> Result<()
     });
     let paces = paces.collect::<Vec<_>>().join("; ");
     if !paces.is_empty() {
+        let (steps, speed) = (Speed::DEFAULT.steps(), Speed::DEFAULT.degrees_per_second());
         note(format_args!(
-            "{paces}, as the registers of speed and duration say; `sevenbot set speed 60` sets the default of 114 degrees/s"
+            "{paces}, as the registers of speed and duration say; `sevenbot set speed {steps}` sets the default of {speed} \
+             degrees/s"
         ));
     }
     Ok(())

@@ -3,6 +3,8 @@
 use std::fmt;
 use std::time::Duration;
 
+use protocol_core::registers::map::SPEED;
+
 /// Angle of a joint in whole degrees, 0 to 180, as in the registers ([D18](protocol_core::decisions#d18)).
 ///
 /// ```
@@ -57,6 +59,8 @@ pub struct Speed(u8);
 impl Speed {
     /// The motor's maximum, 62 rpm. With it [`MoveTime`] applies ([D11](protocol_core::decisions#d11)).
     pub const MAXIMUM: Self = Self(0);
+    /// The speed of every joint after power-up: 114 degrees/s.
+    pub const DEFAULT: Self = Self(SPEED.default_at(SPEED.address));
     /// 62 rpm in degrees/s.
     const MAXIMUM_DEGREES_PER_SECOND: f64 = 372.0;
     /// One step in degrees/s.

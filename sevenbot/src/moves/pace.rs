@@ -72,11 +72,11 @@ impl PaceBefore {
         let (speeds, times) = (self.registers.joints(&SPEED), self.registers.joints(&TIME));
         let mut others: Vec<(u8, Speed, MoveTime)> = Vec::new();
         for ((joint, steps), time) in Joint::ALL.into_iter().zip(speeds).zip(times) {
-            let is_default = steps == SPEED.default_at(SPEED.of(joint));
             let pace = Speed::from_steps(steps).zip(MoveTime::from_steps(time));
-            let Some((speed, time)) = pace.filter(|_| !is_default && self.joints & joint.bit() != 0) else {
+            let Some((speed, time)) = pace else { continue };
+            if speed == Speed::DEFAULT || self.joints & joint.bit() == 0 {
                 continue;
-            };
+            }
             // A duration applies at the maximum speed only (D11).
             let time = if speed == Speed::MAXIMUM { time } else { MoveTime::NONE };
             match others.iter_mut().find(|other| (other.1, other.2) == (speed, time)) {
