@@ -13,8 +13,12 @@ use tty_ports::pty::Pty;
 
 use crate::process::TaskResult;
 
-/// The largest number of bytes in one read. Neither side is read while earlier bytes from it still wait for the other side.
+/// The largest number of bytes in one read. The port is not read while earlier bytes from it still wait for the emulator.
 const CAPACITY: usize = 4_096;
+/// The most bytes that wait for a host that reads late. A wire never makes the chip wait. QEMU does, if its socket is full: the
+/// whole machine stands still and its clock goes on, so that the firmware takes the time for a pause inside a frame, and drops
+/// the frame (D4).
+const WAITING_FOR_HOST: usize = 1 << 20;
 /// The longest sleep while the firmware's log is printed, because the log has to be polled.
 const POLL_PERIOD: Timespec = Timespec { tv_sec: 0, tv_nsec: 50_000_000 };
 
@@ -57,7 +61,7 @@ impl Relay {
         }
         let count = if_ready(self.socket.write(&self.to_arm))?.unwrap_or(0);
         self.to_arm.drain(..count);
-        if self.to_host.is_empty() {
+        if self.to_host.len() < WAITING_FOR_HOST {
             match if_ready(self.socket.read(&mut bytes))? {
                 Some(0) => Err("the emulator has ended")?,
                 count => self.to_host.extend(bytes.iter().take(count.unwrap_or(0))),
@@ -72,10 +76,11 @@ impl Relay {
     /// Sleeps until bytes can be transferred, a client opens or closes the port, or a signal arrives. If `polls`, sleeps at most
     /// for [`POLL_PERIOD`].
     pub(crate) fn sleep(&self, signals: &Signals, polls: bool) -> io::Result<()> {
-        let if_empty = |bytes: &[u8], flags| if bytes.is_empty() { flags } else { PollFlags::empty() };
-        let if_waiting = |bytes: &[u8], flags| if bytes.is_empty() { PollFlags::empty() } else { flags };
-        let port = if_empty(&self.to_arm, PollFlags::IN) | if_waiting(&self.to_host, PollFlags::OUT);
-        let socket = if_empty(&self.to_host, PollFlags::IN) | if_waiting(&self.to_arm, PollFlags::OUT);
+        let flags_if = |condition, flags| if condition { flags } else { PollFlags::empty() };
+        let port = flags_if(self.to_arm.is_empty(), PollFlags::IN)
+            | flags_if(!self.to_host.is_empty(), PollFlags::OUT);
+        let socket = flags_if(self.to_host.len() < WAITING_FOR_HOST, PollFlags::IN)
+            | flags_if(!self.to_arm.is_empty(), PollFlags::OUT);
         let signals = signals.as_fd();
         let clients = self.clients.as_ref().map_or(signals, AsFd::as_fd);
         let mut wanted = [
@@ -96,5 +101,30 @@ fn if_ready(outcome: io::Result<usize>) -> io::Result<Option<usize>> {
     match outcome {
         Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => Ok(None),
         other => other.map(Some),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs::OpenOptions;
+
+    use super::*;
+
+    #[test]
+    fn a_host_that_does_not_read_does_not_stop_the_emulator() -> TaskResult {
+        let (socket, mut emulator) = UnixStream::pair()?;
+        emulator.set_nonblocking(true)?;
+        let mut relay = Relay::new(socket)?;
+        let host = OpenOptions::new().read(true).write(true).open(relay.port())?;
+        // The replies of the system test of D5.
+        let replies = [7; 62_000];
+        for reply in replies.chunks(62) {
+            for byte in reply {
+                emulator.write_all(&[*byte])?;
+            }
+            relay.transfer()?;
+        }
+        drop(host);
+        Ok(())
     }
 }
