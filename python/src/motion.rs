@@ -263,7 +263,7 @@ fn record_reports(
     let vacuum = arm.read_span(Span::of(&VACUUM_PUMP))?.byte(&VACUUM_PUMP) != 0;
     let mut lines = RecordingLines::new(FileVersion::Hundredths);
     done.text = lines.head();
-    let mut recorder = Recorder::new(arm, options.hz, content);
+    let mut recorder = Recorder::begin(arm, options.hz, content)?;
     let mut first = None;
     while watch.goes_on() {
         let Some(pose) = recorder.next(arm, POLL_PERIOD)? else { continue };

@@ -5,6 +5,7 @@ use std::io::{self, Seek, Write};
 use std::path::{Path, PathBuf};
 
 use crate::command_error::CommandError;
+use crate::output_file::OutputFile;
 
 /// A file for appending lines.
 pub(crate) struct LineFile {
@@ -13,10 +14,14 @@ pub(crate) struct LineFile {
 }
 
 impl LineFile {
-    /// Creates the file, or empties it.
-    pub(crate) fn create(path: &Path) -> Result<Self, CommandError> {
-        let file = File::create(path).map_err(|error| CommandError::file(path, error))?;
-        Ok(Self { path: path.to_owned(), file })
+    /// Empties the file.
+    pub(crate) fn begin(output: OutputFile) -> Result<Self, CommandError> {
+        let path = output.path().to_owned();
+        Ok(Self { file: output.begin()?, path })
+    }
+
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
     }
 
     /// Appends whole lines, or nothing.

@@ -22,7 +22,7 @@ pub(crate) struct ForceArg {
 pub(crate) struct OutputFile {
     path: PathBuf,
     file: File,
-    /// It did not exist before, and is removed if nothing is written.
+    /// It did not exist before, and is removed unless its result is written.
     is_new: bool,
 }
 
@@ -32,25 +32,54 @@ impl OutputFile {
         if source.is_some_and(|source| is_same(path, source)) {
             return Err(CommandError::file(path, "this is the file that is read: choose another name"));
         }
-        check_replaceable(path, force)?;
+        if path.is_file() && !force.force {
+            return Err(CommandError::file(path, "the file exists; --force replaces it"));
+        }
         let is_new = !path.exists();
-        let opened = File::options().write(true).create(true).truncate(false).open(path);
+        // A new file does not follow a link that another user planted.
+        let opened = File::options().write(true).create_new(is_new).open(path);
         let file = opened.map_err(|error| CommandError::file(path, error))?;
         Ok(Self { path: path.to_owned(), file, is_new })
     }
 
-    /// Writes the content, and replaces the old one.
-    pub(crate) fn write(mut self, content: &[u8]) -> Result<(), CommandError> {
-        self.is_new = false;
-        self.replace(content).map_err(|error| CommandError::file(&self.path, error))
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
     }
 
-    fn replace(&mut self, content: &[u8]) -> io::Result<()> {
-        if self.file.metadata()?.is_file() {
-            self.file.set_len(0)?;
-        }
-        self.file.write_all(content)
+    /// Writes the content. An existing file is replaced by the whole content, or not at all.
+    pub(crate) fn write(mut self, content: &[u8]) -> Result<(), CommandError> {
+        let is_file = !self.is_new && self.path.is_file();
+        let written = if is_file { replace(&self.path, content) } else { self.file.write_all(content) };
+        self.is_new &= written.is_err();
+        written.map_err(|error| CommandError::file(&self.path, error))
     }
+
+    /// Empties the file, for a result that is written part by part.
+    pub(crate) fn begin(mut self) -> Result<File, CommandError> {
+        self.is_new = false;
+        // A pipe has no length.
+        let emptied = if self.path.is_file() { self.file.set_len(0) } else { Ok(()) };
+        emptied.and_then(|()| self.file.try_clone()).map_err(|error| CommandError::file(&self.path, error))
+    }
+}
+
+impl Drop for OutputFile {
+    fn drop(&mut self) {
+        if self.is_new {
+            let _ = fs::remove_file(&self.path);
+        }
+    }
+}
+
+/// Writes a file beside the old one, and gives it the name of the old one when it is complete.
+fn replace(path: &Path, content: &[u8]) -> io::Result<()> {
+    // Replace the file, not a link to it.
+    let path = fs::canonicalize(path)?;
+    let beside = path.with_added_extension("new");
+    // An earlier run may have left a file. A link that another user planted is removed as well, so that it is not followed.
+    let _ = fs::remove_file(&beside);
+    let written = File::create_new(&beside).and_then(|mut file| file.write_all(content));
+    written.and_then(|()| fs::rename(&beside, path)).inspect_err(|_| drop(fs::remove_file(&beside)))
 }
 
 /// Standard output for the content of a file, unchanged: the printer would remove escape sequences from it. The name of a
@@ -64,23 +93,6 @@ pub(crate) fn stdout_for(binary: Option<&str>) -> Result<Stdout, CommandError> {
             Err(CommandError::Usage(format!("a terminal cannot show {name}: {advice}")))
         }
     }
-}
-
-impl Drop for OutputFile {
-    fn drop(&mut self) {
-        if self.is_new {
-            let _ = fs::remove_file(&self.path);
-        }
-    }
-}
-
-/// Fails if there is a file at the path that may not be replaced. Writing to a pipe or a device is always allowed, because it
-/// destroys nothing.
-pub(crate) fn check_replaceable(path: &Path, force: ForceArg) -> Result<(), CommandError> {
-    if path.is_file() && !force.force {
-        return Err(CommandError::file(path, "the file exists; --force replaces it"));
-    }
-    Ok(())
 }
 
 /// Do both paths name one file, which need not exist?
@@ -119,6 +131,29 @@ mod tests {
         assert_eq!(fs::read(&path).expect("a file"), b"long");
         OutputFile::open(&path, None, FORCE).and_then(|file| file.write(b"new")).expect("a file");
         assert_eq!(fs::read(&path).expect("a file"), b"new");
+        OutputFile::open(&path, None, FORCE).and_then(OutputFile::begin).expect("a file");
+        assert_eq!(fs::read(&path).expect("a file"), b"");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_planted_link_is_not_followed() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let [path, victim, draft] =
+            ["arm.toml", "victim", "arm.toml.new"].map(|name| folder.path().join(name));
+        let write = || OutputFile::open(&path, None, FORCE).and_then(|file| file.write(b"settings"));
+        fs::write(&victim, "letters").expect("a file");
+        std::os::unix::fs::symlink(&victim, &draft).expect("a link");
+        for _ in 0..2 {
+            write().expect("a file");
+            assert_eq!(fs::read(&path).expect("a file"), b"settings");
+            assert!(fs::symlink_metadata(&path).expect("a file").is_file());
+        }
+        assert!(!draft.exists());
+        fs::remove_file(&path).expect("a file");
+        std::os::unix::fs::symlink(folder.path().join("not there"), &path).expect("a link");
+        write().expect_err("a link to nothing");
+        assert_eq!(fs::read(&victim).expect("a file"), b"letters");
     }
 
     #[test]

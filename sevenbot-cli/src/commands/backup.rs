@@ -1,8 +1,7 @@
 //! `backup`, `restore`: copy the settings of an arm to a file, and back.
 
-use std::fs::{self, File};
 use std::io::{self, Write};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 use serde::Serialize;
@@ -15,6 +14,7 @@ use sevenbot::{Arm, Register, Snapshot};
 use crate::command_error::CommandError;
 use crate::confirm::confirm;
 use crate::interrupt::hold_on_interrupt;
+use crate::output_file::{ForceArg, OutputFile};
 use crate::printer::{Printable, note, warn};
 use crate::session::Session;
 use crate::settings_file::{SettingsFile, span};
@@ -33,9 +33,8 @@ Examples:
 pub(crate) struct BackupArgs {
     /// The file; - is standard output.
     file: PathBuf,
-    /// Replace an existing file.
-    #[arg(long)]
-    force: bool,
+    #[command(flatten)]
+    force: ForceArg,
 }
 
 /// Write settings from a file to the arm, and verify them.
@@ -68,32 +67,9 @@ pub(crate) fn backup(session: &mut Session, args: &BackupArgs) -> Result<(), Com
     if args.file.as_os_str() == "-" {
         return session.printer.print(&file);
     }
-    write_whole(&args.file, &text, args.force)?;
+    OutputFile::open(&args.file, None, args.force)?.write(text.as_bytes())?;
     note(format_args!("settings written to {}", args.file.display()));
     Ok(())
-}
-
-/// Writes a file. Without `may_replace` the file must not exist. With `may_replace`, an old regular file is replaced when the
-/// new one is complete, and anything else, such as a pipe or a link, is written to directly.
-fn write_whole(path: &Path, text: &str, may_replace: bool) -> Result<(), CommandError> {
-    let is_special = fs::symlink_metadata(path).is_ok_and(|there| !there.is_file());
-    if may_replace && is_special {
-        return fs::write(path, text).map_err(|error| CommandError::file(path, error));
-    }
-    if may_replace {
-        let beside = path.with_extension("toml.new");
-        // Remove a file that an earlier run left. This also removes a link that another user planted, so that it is not followed.
-        let _ = fs::remove_file(&beside);
-        return File::create_new(&beside)
-            .and_then(|mut file| file.write_all(text.as_bytes()))
-            .and_then(|()| fs::rename(&beside, path))
-            .map_err(|error| CommandError::file(path, error));
-    }
-    let written = File::create_new(path).and_then(|mut file| file.write_all(text.as_bytes()));
-    written.map_err(|error| match error.kind() {
-        io::ErrorKind::AlreadyExists => CommandError::file(path, "the file exists; --force replaces it"),
-        _ => CommandError::file(path, error),
-    })
 }
 
 pub(crate) fn restore(session: &mut Session, args: &RestoreArgs) -> Result<(), CommandError> {
@@ -194,23 +170,5 @@ fn in_words(address: u8, byte: u8) -> String {
         Some(row) if [BAUD_RATE, OPTIONS].contains(row) => meaning(row, byte),
         Some(row) => format!("{} {}", row.range.decode_byte(byte), row.unit.symbol()).trim_end().to_owned(),
         None => byte.to_string(),
-    }
-}
-
-#[cfg(all(test, unix))]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_planted_link_is_not_followed() {
-        let folder = tempfile::tempdir().expect("a folder");
-        let [path, victim, draft] =
-            ["arm.toml", "victim", "arm.toml.new"].map(|name| folder.path().join(name));
-        fs::write(&victim, "letters").expect("a file");
-        std::os::unix::fs::symlink(&victim, &draft).expect("a link");
-        write_whole(&path, "settings", true).expect("a file");
-        assert_eq!(fs::read(&victim).expect("a file"), b"letters");
-        assert_eq!(fs::read(&path).expect("a file"), b"settings");
-        assert!(fs::symlink_metadata(&path).expect("a file").is_file());
     }
 }

@@ -36,7 +36,7 @@ pub struct RecordedPose {
 /// let (mut arm, _) = simulated::arm(SimulationConfig::default())?;
 /// let content = arm.exact_positions()?;
 /// let poses = arm.with_reports(50, content, |arm| {
-///     let mut recorder = Recorder::new(arm, 50, content);
+///     let mut recorder = Recorder::begin(arm, 50, content)?;
 ///     (0..10).map(|_| recorder.next(arm, Duration::from_secs(1))).collect::<Result<Vec<_>, MoveError>>()
 /// })?;
 /// let last = poses.into_iter().flatten().last().ok_or("no pose")?;
@@ -54,11 +54,14 @@ pub struct Recorder {
 impl Recorder {
     /// For the reports of [`Arm::with_reports`] with the same arguments. Drops reports that were received before, because they
     /// may be of an earlier move.
-    #[must_use]
-    pub fn new(arm: &mut Arm, hz: u8, content: u8) -> Self {
+    ///
+    /// # Errors
+    /// A servo does not answer, so that its position is unknown: [`MoveError::Problems`]. Also the errors of [`Arm::read`].
+    pub fn begin(arm: &mut Arm, hz: u8, content: u8) -> Result<Self, MoveError> {
+        let mut check = MoveCheck::of_positions(arm);
+        check.check(arm)?;
         arm.reports().for_each(drop);
-        let check = MoveCheck::of_positions(arm);
-        Self { clock: ReportClock::new(arm.report_period(hz, content)), last_report: arm.now(), check }
+        Ok(Self { clock: ReportClock::new(arm.report_period(hz, content)), last_report: arm.now(), check })
     }
 
     /// The next pose; `None` if none arrives within `timeout`.

@@ -227,7 +227,7 @@ fn reports_from_before_the_recording_are_no_poses_of_it() -> Result<(), Box<dyn 
         // A read receives the reports that wait in the line.
         arm.positions()?;
         let begun = arm.now();
-        let mut recorder = Recorder::new(arm, 50, content);
+        let mut recorder = Recorder::begin(arm, 50, content)?;
         let first = recorder.next(arm, Duration::from_secs(1))?;
         assert!(first.is_some_and(|pose| pose.received > begun), "{first:?}");
         Ok(())

@@ -31,7 +31,7 @@ use crate::command_error::CommandError;
 use crate::guard_args::GuardArgs;
 use crate::interrupt::Interrupt;
 use crate::line_file::LineFile;
-use crate::output_file::{ForceArg, check_replaceable};
+use crate::output_file::{ForceArg, OutputFile};
 use crate::printer::warn;
 use crate::session::Session;
 
@@ -146,9 +146,9 @@ fn show_lines(session: &mut Session, args: &MonitorArgs) -> Result<(), CommandEr
 }
 
 fn write_csv(session: &Session, args: &MonitorArgs, path: &Path) -> Result<(), CommandError> {
-    check_replaceable(path, args.force)?;
+    let output = OutputFile::open(path, None, args.force)?;
     let mut arm = session.connect()?;
-    let mut file = LineFile::create(path)?;
+    let mut file = LineFile::begin(output)?;
     let mut write = |line: String| file.add(&format!("{line}\n"));
     write(LineFormat::Csv.head())?;
     each_sample(&mut arm, args.period(), args.samples.unwrap_or(u64::MAX), |sample| {

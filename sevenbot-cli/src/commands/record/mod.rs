@@ -142,7 +142,7 @@ pub(crate) fn run(session: &mut Session, args: &RecordArgs) -> Result<(), Comman
         report_content::POSITIONS => FileVersion::Degrees,
         _ => FileVersion::Hundredths,
     };
-    let mut outputs = Outputs::create(args.file.as_deref(), args.mcap.as_deref(), version)?;
+    let mut outputs = Outputs::open(args.file.as_deref(), args.mcap.as_deref(), version)?;
     Interrupt::catch();
     let before = arm.joints()?;
     let baud = session.options.baud;
@@ -215,8 +215,8 @@ fn record_reports(
 ) -> Result<(), CommandError> {
     let vacuum = arm.read_span(Span::of(&VACUUM_PUMP))?.byte(&VACUUM_PUMP) != 0;
     let mut pendant = TeachPendant::new(arm.targets()?, vacuum, args.driven);
-    let mut recorder = Recorder::new(arm, args.hz, content);
-    let mut telemetry = outputs.has_telemetry().then(|| {
+    let mut recorder = Recorder::begin(arm, args.hz, content)?;
+    let mut telemetry = args.mcap.is_some().then(|| {
         let (reports, is_fine) =
             (arm.report_period(args.hz, content), content == report_content::FINE_POSITIONS);
         TelemetryReader::new(arm, baud, reports, args.driven, is_fine)

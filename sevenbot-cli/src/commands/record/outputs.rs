@@ -1,7 +1,6 @@
 //! The outputs of a recording: a text file, an MCAP file, or both.
 
-use std::fs::File;
-use std::io::{self, Write};
+use std::io::{self, Stdout, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
@@ -11,16 +10,31 @@ use sevenbot::recording::{FileVersion, Moment, RecordingLines};
 
 use crate::command_error::CommandError;
 use crate::line_file::LineFile;
-use crate::output_file::{is_same, stdout_for};
+use crate::output_file::{ForceArg, OutputFile, is_same, stdout_for};
 use crate::printer::note;
+
+/// The user was asked whether existing files may be replaced.
+const REPLACE: ForceArg = ForceArg { force: true };
 
 /// The files of a recording. All of them get the same moments.
 pub(crate) struct Outputs {
     lines: RecordingLines,
-    text: Option<(PathBuf, LineFile)>,
+    /// The files until the first moment. So existing ones keep their content if nothing is recorded.
+    opened: Option<Opened>,
+    text: Option<LineFile>,
     mcap: Option<McapFile>,
     /// The wall-clock time to which the times of the moments are added, since 1970. Set when the first moment is added.
     start: Option<Duration>,
+}
+
+struct Opened {
+    text: Option<OutputFile>,
+    mcap: Option<McapOutput>,
+}
+
+enum McapOutput {
+    Stdout(Stdout),
+    File(OutputFile),
 }
 
 struct McapFile {
@@ -29,8 +43,8 @@ struct McapFile {
 }
 
 impl Outputs {
-    /// Creates the files, or empties existing ones, and writes their heads.
-    pub(crate) fn create(
+    /// Opens the files, which may replace existing ones.
+    pub(crate) fn open(
         text: Option<&Path>,
         mcap: Option<&Path>,
         version: FileVersion,
@@ -40,26 +54,23 @@ impl Outputs {
         {
             return Err(CommandError::file(mcap, "the text and the MCAP recording need two files"));
         }
-        let lines = RecordingLines::new(version);
-        let mut text =
-            text.map(|path| Ok::<_, CommandError>((path.to_owned(), LineFile::create(path)?))).transpose()?;
-        if let Some((_, file)) = &mut text {
-            file.add(&lines.head())?;
-        }
-        Ok(Self { lines, text, mcap: mcap.map(McapFile::create).transpose()?, start: None })
+        let text = text.map(|path| OutputFile::open(path, None, REPLACE)).transpose()?;
+        let opened = Some(Opened { text, mcap: mcap.map(McapOutput::open).transpose()? });
+        Ok(Self { lines: RecordingLines::new(version), opened, text: None, mcap: None, start: None })
     }
 
-    /// Does a file take telemetry besides poses? Only MCAP does.
-    pub(crate) const fn has_telemetry(&self) -> bool {
-        self.mcap.is_some()
+    /// Empties the files, and writes their heads.
+    fn begin(&mut self, Opened { text, mcap }: Opened) -> Result<(), CommandError> {
+        self.text = text.map(LineFile::begin).transpose()?;
+        self.mcap = mcap.map(McapFile::begin).transpose()?;
+        self.text.as_mut().map_or(Ok(()), |file| file.add(&self.lines.head()))
     }
 
     /// Adds a moment. Ignores a moment that is less than a millisecond later than the last one.
     pub(crate) fn add(&mut self, moment: &Moment, telemetry: &Telemetry) -> Result<(), CommandError> {
         let Some(line) = self.lines.add(moment) else { return Ok(()) };
-        if let Some((_, file)) = &mut self.text {
-            file.add(&line)?;
-        }
+        self.opened.take().map_or(Ok(()), |opened| self.begin(opened))?;
+        self.text.as_mut().map_or(Ok(()), |file| file.add(&line))?;
         let at = self.start() + moment.time;
         self.mcap.as_mut().map_or(Ok(()), |file| file.write(|writer| writer.add(at, moment, telemetry)))
     }
@@ -84,16 +95,25 @@ impl Outputs {
         self.lines.duration()
     }
 
-    /// Finishes the MCAP file. The text file needs no end.
+    /// Finishes the MCAP file. The text file needs no end. Fails if nothing was recorded.
     pub(crate) fn finish(&mut self) -> Result<(), CommandError> {
+        if self.opened.is_some() {
+            return Err(CommandError::Arm("the recording ended before its first moment".to_owned()));
+        }
         self.mcap.as_mut().map_or(Ok(()), |file| file.write(McapWriter::finish))
     }
 
     /// After a failure, tells the user how much the files hold.
     pub(crate) fn note_what_is_there(&self) {
-        if let Some((path, _)) = &self.text {
+        if self.opened.is_some() {
+            note("nothing was recorded, and no file has changed");
+        }
+        if let Some(file) = &self.text {
             let (moments, seconds) = (self.count(), self.duration().as_secs_f64());
-            note(format_args!("{} is complete up to {seconds:.1} s, {moments} moments", path.display()));
+            note(format_args!(
+                "{} is complete up to {seconds:.1} s, {moments} moments",
+                file.path().display()
+            ));
         }
         if let Some(McapFile { path, writer }) = &self.mcap {
             let place = if is_stdout(path) { "standard output".into() } else { path.display().to_string() };
@@ -113,16 +133,25 @@ impl Outputs {
     }
 }
 
+impl McapOutput {
+    fn open(path: &Path) -> Result<Self, CommandError> {
+        if is_stdout(path) {
+            return Ok(Self::Stdout(stdout_for(Some("mcap"))?));
+        }
+        Ok(Self::File(OutputFile::open(path, None, REPLACE)?))
+    }
+}
+
 impl McapFile {
-    fn create(path: &Path) -> Result<Self, CommandError> {
-        let out: Box<dyn Write> = match is_stdout(path) {
-            true => Box::new(stdout_for(Some("mcap"))?),
-            false => Box::new(File::create(path).map_err(|error| CommandError::file(path, error))?),
+    fn begin(output: McapOutput) -> Result<Self, CommandError> {
+        let (path, out): (_, Box<dyn Write>) = match output {
+            McapOutput::Stdout(stdout) => (PathBuf::from("-"), Box::new(stdout)),
+            McapOutput::File(file) => (file.path().to_owned(), Box::new(file.begin()?)),
         };
         // A pipe is read while it is written, so it needs each message at once.
         let layout = if path.is_file() { McapLayout::Indexed } else { McapLayout::Live };
-        let writer = McapWriter::new(out, layout).map_err(|error| failed(path, error))?;
-        Ok(Self { path: path.to_owned(), writer })
+        let writer = McapWriter::new(out, layout).map_err(|error| failed(&path, error))?;
+        Ok(Self { path, writer })
     }
 
     fn write(

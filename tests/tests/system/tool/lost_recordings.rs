@@ -83,6 +83,31 @@ fn a_recording_is_complete_up_to_a_full_disk() {
 }
 
 #[test]
+fn a_file_keeps_its_content_until_there_is_new_content() {
+    with_arm(TestSetup::any().fault("3=missing"), |arm| {
+        let (folder, old) = file("old.txt", WAVE);
+        let new = folder.path().join("new.txt");
+        let [old, new] = [&old, &new].map(|path| text(path));
+        let recorded = arm.sevenbot(&["record", old, "--mcap", new, "--driven", "--yes", "--seconds", "1"]);
+        assert!(failed(&recorded, 1).contains("nothing was recorded, and no file has changed"));
+        assert_eq!(fs::read_to_string(old).expect("a file"), WAVE);
+        assert!(fs::read(new).is_err(), "a file without content");
+        // No file can grow in this shell.
+        let no_room = "trap '' XFSZ; ulimit -f 0; exec \"$0\" \"$@\"";
+        for output in [old, new] {
+            let mut tool = Command::new("sh");
+            tool.args(["-c", no_room])
+                .arg(sevenbot())
+                .args(["convert", "--force", "--to", "csv", "-", output]);
+            let recording = fs::File::open(old).expect("a file");
+            failed(&tool.stdin(recording).output().expect("a shell"), 1);
+        }
+        assert_eq!(fs::read_to_string(old).expect("a file"), WAVE);
+        assert_eq!(fs::read_dir(folder.path()).expect("a folder").count(), 1, "a file without content");
+    });
+}
+
+#[test]
 fn a_lost_connection_during_play_leaves_a_plot() {
     with_arm(TestSetup::any().needs(Need::Kill), |arm| {
         let (folder, recording) = file("long.txt", &format!("{WAVE}60 180 90 65 90 90 90 80 0\n"));
