@@ -1,6 +1,6 @@
 //! `Recording`: a movement as a text file, and as arrays.
 
-use std::fs::{self, File};
+use std::fs::File;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::PathBuf;
 
@@ -9,6 +9,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PySlice, PyType};
 use recording_formats::{Format, ReadError};
 use sevenbot::recording::{FileVersion, Moment, Recording as Moments, head};
+use sevenbot::whole_file;
 
 use crate::bulk;
 use crate::errors::{InvalidType, InvalidValue, file_error, raised};
@@ -112,7 +113,7 @@ impl Recording {
         let format = Format::of_name(&path).unwrap_or(Format::Text);
         let mut bytes = Vec::new();
         let written = recording_formats::write(&self.moments, format, &mut bytes);
-        written.and_then(|()| fs::write(&path, bytes)).map_err(|why| file_error(py, &path, &why))
+        written.and_then(|()| whole_file::write(&path, &bytes)).map_err(|why| file_error(py, &path, &why))
     }
 
     /// The times of the moments in seconds: a numpy array, or a tuple without numpy.

@@ -28,6 +28,8 @@ TOLERANCE = 0.5
 ENOUGH = 120.0
 #: The reply timeout in seconds. On a busy machine an answer of the emulator may take longer than the default timeout.
 ANSWER_TIME = 20.0
+#: The time in seconds in which an arm at its targets comes to rest, on a busy machine.
+TIME_TO_REST = 10.0
 #: Parts of the errors on a machine that is too busy for an emulator: the arm stopped on its way, or a servo answered late.
 BUSY = ("this program paused", "does not answer", "no servo answers")
 
@@ -76,8 +78,13 @@ def started(words: list[str], link: Path) -> Iterator[Path]:
 
 
 def assert_at_end(program: Path, link: Path) -> None:
+    """Checks where the arm comes to rest. On a busy machine the controller makes up for the load of a joint later."""
+    expected = pytest.approx(end_of(program), abs=TOLERANCE)
     with sevenbot.Arm(link, timeout=ANSWER_TIME) as arm:
-        assert list(arm.angles) == pytest.approx(end_of(program), abs=TOLERANCE)
+        end = time.monotonic() + TIME_TO_REST
+        while list(arm.angles) != expected and time.monotonic() < end:
+            time.sleep(0.1)
+        assert list(arm.angles) == expected
 
 
 needs_programs = pytest.mark.skipif(PROGRAMS is None, reason="SEVENBOT_PROGRAMS names no folder with programs")

@@ -4,8 +4,10 @@
 //! result is there.
 
 use std::fs::{self, File};
-use std::io::{self, IsTerminal, Stdout, Write};
+use std::io::{self, IsTerminal, Stdout};
 use std::path::{Path, PathBuf};
+
+use sevenbot::whole_file;
 
 use crate::command_error::CommandError;
 
@@ -48,8 +50,7 @@ impl OutputFile {
 
     /// Writes the content. An existing file is replaced by the whole content, or not at all.
     pub(crate) fn write(mut self, content: &[u8]) -> Result<(), CommandError> {
-        let is_file = !self.is_new && self.path.is_file();
-        let written = if is_file { replace(&self.path, content) } else { self.file.write_all(content) };
+        let written = whole_file::write(&self.path, content);
         self.is_new &= written.is_err();
         written.map_err(|error| CommandError::file(&self.path, error))
     }
@@ -69,17 +70,6 @@ impl Drop for OutputFile {
             let _ = fs::remove_file(&self.path);
         }
     }
-}
-
-/// Writes a file beside the old one, and gives it the name of the old one when it is complete.
-fn replace(path: &Path, content: &[u8]) -> io::Result<()> {
-    // Replace the file, not a link to it.
-    let path = fs::canonicalize(path)?;
-    let beside = path.with_added_extension("new");
-    // An earlier run may have left a file. A link that another user planted is removed as well, so that it is not followed.
-    let _ = fs::remove_file(&beside);
-    let written = File::create_new(&beside).and_then(|mut file| file.write_all(content));
-    written.and_then(|()| fs::rename(&beside, path)).inspect_err(|_| drop(fs::remove_file(&beside)))
 }
 
 /// Standard output for the content of a file, unchanged: the printer would remove escape sequences from it. The name of a
@@ -139,21 +129,9 @@ mod tests {
     #[test]
     fn a_planted_link_is_not_followed() {
         let folder = tempfile::tempdir().expect("a folder");
-        let [path, victim, draft] =
-            ["arm.toml", "victim", "arm.toml.new"].map(|name| folder.path().join(name));
-        let write = || OutputFile::open(&path, None, FORCE).and_then(|file| file.write(b"settings"));
-        fs::write(&victim, "letters").expect("a file");
-        std::os::unix::fs::symlink(&victim, &draft).expect("a link");
-        for _ in 0..2 {
-            write().expect("a file");
-            assert_eq!(fs::read(&path).expect("a file"), b"settings");
-            assert!(fs::symlink_metadata(&path).expect("a file").is_file());
-        }
-        assert!(!draft.exists());
-        fs::remove_file(&path).expect("a file");
+        let path = folder.path().join("arm.toml");
         std::os::unix::fs::symlink(folder.path().join("not there"), &path).expect("a link");
-        write().expect_err("a link to nothing");
-        assert_eq!(fs::read(&victim).expect("a file"), b"letters");
+        OutputFile::open(&path, None, FORCE).expect_err("a link to nothing");
     }
 
     #[test]

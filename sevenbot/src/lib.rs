@@ -75,6 +75,7 @@ pub mod table;
 pub mod traffic;
 mod traffic_text;
 pub mod units;
+pub mod whole_file;
 pub mod wire_log;
 
 pub use arm::Arm;

@@ -13,6 +13,7 @@ use std::path::{Path, PathBuf};
 
 use crate::fine_angle::FineAngle;
 use crate::fine_state::FineTargets;
+use crate::whole_file;
 
 /// Where the file is; `None` if the user has no directory for settings.
 #[must_use]
@@ -51,7 +52,7 @@ pub fn keep(path: &Path, chip: &str, pose: &FineTargets) -> io::Result<()> {
     if let Some(directory) = path.parent() {
         fs::create_dir_all(directory)?;
     }
-    fs::write(path, lines.join("\n") + "\n")
+    whole_file::write(path, (lines.join("\n") + "\n").as_bytes())
 }
 
 fn parse(line: &str) -> Option<FineTargets> {
@@ -73,8 +74,8 @@ mod tests {
 
     #[test]
     fn a_pose_is_kept_for_its_arm_only() {
-        let directory = env::temp_dir().join(format!("park-poses-{}", std::process::id()));
-        let path = directory.join("7bot").join("park-poses");
+        let directory = tempfile::tempdir().expect("a folder");
+        let path = directory.path().join("7bot").join("park-poses");
         assert!(matches!(load(&path, "AB"), Ok(None)));
         let pose =
             [None, FineAngle::from_degrees(90.25), None, None, None, None, FineAngle::from_degrees(0.0)];
@@ -86,6 +87,5 @@ mod tests {
         assert_eq!(load(&path, "CD").expect("a file"), Some(other));
         fs::write(&path, "AB 1 2 3\n").expect("a file");
         assert!(load(&path, "AB").is_err());
-        fs::remove_dir_all(directory).expect("the directory is there");
     }
 }

@@ -3,11 +3,12 @@
 //! The file `names` of the state directory has a line for each, such as `lab-3 tls://10.0.0.5:7777`.
 
 use std::fs;
-use std::io::{self, ErrorKind, Write};
+use std::io::{self, ErrorKind};
 use std::path::Path;
 
 use super::address::Address;
 use super::directories::state_directory;
+use crate::whole_file;
 
 const FILE: &str = "names";
 /// The largest number of names. The oldest ones are forgotten first.
@@ -83,15 +84,10 @@ fn change(change: impl FnOnce(&mut Vec<KnownName>)) -> io::Result<()> {
     if names == before { Ok(()) } else { write(&directory, &names) }
 }
 
-/// Replaces the file: another program reads the old one or the new one.
 fn write(directory: &Path, names: &[KnownName]) -> io::Result<()> {
     let kept = names.get(names.len().saturating_sub(MOST_NAMES)..).unwrap_or_default();
     let text: String = kept.iter().map(|known| format!("{} {}\n", known.name, known.address)).collect();
-    let new = directory.join(format!("{FILE}.{}.new", std::process::id()));
-    // Only this user can write here, so such a file is left from a program that was killed.
-    let _ = fs::remove_file(&new);
-    fs::File::create_new(&new)?.write_all(text.as_bytes())?;
-    fs::rename(&new, directory.join(FILE))
+    whole_file::write(&directory.join(FILE), text.as_bytes())
 }
 
 #[cfg(test)]
