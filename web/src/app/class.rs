@@ -10,7 +10,7 @@ use web_sys::HtmlInputElement;
 use super::class_socket::ClassSocket;
 use super::class_tab::ClassTab;
 use super::editor::Editor;
-use super::page::{App, Line, browser_now, with_app};
+use super::page::{App, Line, OwnArm, browser_now, with_app};
 use super::storage;
 use crate::class::{Activity, Membership, report, stop_of_the_real_arm};
 use crate::client::Client;
@@ -235,7 +235,7 @@ impl App {
         }
     }
 
-    /// Shows who has the class's real arm. Begins to drive the arm when this pupil gets it, and returns to the simulated arm when
+    /// Shows who has the class's real arm. Begins to drive the arm when this pupil gets it, and returns to the pupil's own arm when
     /// this pupil loses it.
     fn show_real_arm(&mut self, arm: Option<LentArm>, over: Option<LeaseEnd>) {
         let text = arm.as_ref().map_or(String::new(), |arm| {
@@ -264,14 +264,15 @@ impl App {
         }
     }
 
-    /// Begins to drive the class's real arm. The simulated arm is set aside, and its time stands still.
+    /// Begins to drive the class's real arm. The pupil's own arm is set aside; the time of a simulated one stands still.
     fn begin_real_arm(&mut self) {
         self.stop();
         self.carry_out_stop();
         let Some(query) = self.class.as_ref().and_then(ClassTab::arm_query) else { return };
         let Ok(source) = SocketSource::connect_with(&query) else { return };
-        let before = self.swap_line((Line::Remote(Box::new(source)), Client::default()));
-        self.set_aside.get_or_insert(before);
+        let chosen = self.dom.choice("source");
+        let (line, client) = self.swap_line((Line::Remote(Box::new(source)), Client::default()));
+        self.set_aside.get_or_insert(OwnArm { line, client, chosen });
         self.dom.choose("source", "server");
         self.dom.notice(self.language.text("arm-begins"));
     }
@@ -291,18 +292,19 @@ impl App {
         }
     }
 
-    /// Hides the lease of the real arm, and returns to the simulated arm if the page drove the real one. `text` is the name of
+    /// Hides the lease of the real arm, and returns to the pupil's own arm if the page drove the real one. `text` is the name of
     /// the text that gives the reason; `None` shows no notice.
     fn end_real_arm(&mut self, text: Option<&'static str>) {
         self.dom.set_text("class-arm", "");
         self.dom.set_hidden("stop-class-arm", true);
         self.class.iter_mut().for_each(|class| class.arm = None);
-        let Some(own) = self.set_aside.take() else { return };
-        if matches!(self.line, Line::Remote(_)) {
-            self.swap_line(own);
+        let Some(OwnArm { line, client, chosen }) = self.set_aside.take() else { return };
+        // During the lease the pupil can choose another arm.
+        if self.dom.choice("source") == "server" {
+            self.swap_line((line, client));
             self.last_frame = browser_now();
+            self.dom.choose("source", &chosen);
         }
-        self.dom.choose("source", "simulator");
         text.into_iter().for_each(|text| self.dom.notice(self.language.text(text)));
     }
 }

@@ -55,6 +55,14 @@ impl Line {
     }
 }
 
+/// The pupil's own arm while the page drives the class's real arm.
+pub(super) struct OwnArm {
+    pub(super) line: Line,
+    pub(super) client: Client,
+    /// What the pupil chose in the list of arms.
+    pub(super) chosen: String,
+}
+
 /// The state of the page. The browser's handlers reach it by [`with_app`].
 pub(super) struct App {
     pub(super) dom: Dom,
@@ -80,7 +88,7 @@ pub(super) struct App {
     pub(super) slid_round: u64,
     pub(super) frames: u32,
     pub(super) hovered: Option<Part>,
-    /// The position of a dragged tip that the arm cannot reach, in mm, and the name of the text that gives the reason.
+    /// The position of a dragged tip to which the arm does not go, in mm, and the name of the text that gives the reason.
     pub(super) unreachable: Option<(Vec3, &'static str)>,
     /// The joint of a limp simulated arm that the pointer holds.
     pub(super) hand: Option<u8>,
@@ -94,8 +102,8 @@ pub(super) struct App {
     pub(super) tour_step: usize,
     /// `None` outside a class.
     pub(super) class: Option<ClassTab>,
-    /// The simulated arm and its client, while the page drives the class's real arm.
-    pub(super) set_aside: Option<(Line, Client)>,
+    /// `None` unless the page drives the class's real arm.
+    pub(super) set_aside: Option<OwnArm>,
 }
 
 thread_local! {
@@ -243,8 +251,8 @@ impl App {
         self.frames = self.frames.wrapping_add(1);
     }
 
-    /// Carries out a stop at once, without waiting for the next picture: sends its frames, and advances a simulated arm until it
-    /// holds, also if its time is paused.
+    /// Carries out a stop at once, without waiting for the next picture: sends its frames, and advances a simulated arm, also a
+    /// paused one, until it holds. The arm gets at most [`STEPS_OF_STOP`] steps and [`FRAME_BUDGET_MS`].
     pub(super) fn carry_out_stop(&mut self) {
         let until = browser_now() + FRAME_BUDGET_MS;
         for _ in 0..STEPS_OF_STOP {
@@ -256,8 +264,8 @@ impl App {
         }
     }
 
-    /// Continues a park, movement or program, sends the frames that are due, advances a simulated arm by `virtual_ms`, or less
-    /// when the browser's clock reaches `until`, and takes the bytes of the arm.
+    /// Continues a park, movement or program, sends the frames that are due, and takes the bytes of the arm. A simulated arm
+    /// advances by `virtual_ms`, or less if the browser's clock reaches `until`.
     fn exchange(&mut self, virtual_ms: f64, until: f64) {
         let now = self.now();
         self.play(now);
