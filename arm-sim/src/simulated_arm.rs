@@ -194,7 +194,7 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
         self.tap = Watcher::holding(Box::new(tap));
     }
 
-    /// The time of the last call.
+    /// The time up to which the arm is simulated.
     #[must_use]
     pub const fn now(&self) -> Instant {
         self.now
@@ -295,7 +295,11 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
         // The bytes of the next host wait until the bytes of the leaving host are executed.
         let end = self.leaving.unwrap_or(usize::MAX).min(arrived.len());
         let taken = self.controller.host_bytes(self.now, arrived.get(..end).unwrap_or(arrived));
-        if let (Some(tap), Some(bytes)) = (self.tap.get(), arrived.get(..taken)) {
+        // Without bytes the tap takes the line for idle.
+        let is_idle = arrived.is_empty();
+        if let (Some(tap), Some(bytes)) = (self.tap.get(), arrived.get(..taken))
+            && (taken > 0 || is_idle)
+        {
             tap.received(self.now, bytes);
         }
         self.to_arm.take(taken);

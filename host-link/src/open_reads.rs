@@ -12,9 +12,9 @@ use crate::span::Span;
 ///
 /// A read is repeated as soon as its reply is later than an allowance: twice the recent delay of replies, and
 /// [`ROUND_TRIP`] before the first reply. The time to the next repeat doubles, up to [`ROUND_TRIP`] or the allowance,
-/// whichever is longer. It is repeated at once if its reply comes damaged. A read changes nothing, so a needless repeat does no harm. The read is given up `attempts` times
-/// `timeout` after the reply to its first attempt was due. So a lost reply costs little time, several lost replies are no
-/// error, and a slow arm gets the whole time.
+/// whichever is longer. A read whose reply comes damaged is repeated at once. A read changes nothing, so a needless repeat
+/// does no harm. The read is given up `attempts` times `timeout` after the reply to its first attempt was due. So a lost
+/// reply costs little time, several lost replies are no error, and a slow arm gets the whole time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Patience {
     /// The wait for the reply lasts this many times `timeout`, at least once. A read with one attempt is not repeated.
@@ -36,7 +36,7 @@ impl Patience {
 
     /// The time between attempt number `sent`, from 1, and the next one.
     fn before_repeat(self, sent: u32, allowance: Duration) -> Duration {
-        let doubled = allowance.as_micros().checked_shl(sent.saturating_sub(1)).unwrap_or(u64::MAX);
+        let doubled = allowance.as_micros().saturating_mul(1 << sent.saturating_sub(1).min(32));
         let longest = self.timeout.min(allowance.max(ROUND_TRIP));
         longest.min(Duration::from_micros(doubled))
     }
@@ -136,5 +136,18 @@ impl OpenReads {
     /// When the next read is repeated or given up.
     pub(crate) fn due(&self) -> Instant {
         self.0.iter().map(|read| read.due).min().unwrap_or(Instant::FAR_FUTURE)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_time_to_the_next_repeat_doubles_up_to_a_limit() {
+        let patience = Patience { attempts: u32::MAX, timeout: Duration::from_millis(500) };
+        let allowance = Duration::from_millis(4);
+        let times = [1, 2, 3, 59, 64, u32::MAX].map(|sent| patience.before_repeat(sent, allowance));
+        assert_eq!(times, [4, 8, 16, 100, 100, 100].map(Duration::from_millis));
     }
 }

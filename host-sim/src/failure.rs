@@ -1,6 +1,7 @@
 //! The errors of the program `host-sim`, and their exit statuses.
 
 use std::io;
+use std::path::PathBuf;
 
 use arm_sim::faults::ArmFault;
 use host_sim::eeprom::ImageError;
@@ -17,6 +18,8 @@ pub(crate) enum Failure {
     Image(#[from] ImageError),
     #[error("--link {0}")]
     Symlink(#[from] SymlinkError),
+    #[error("--angles {}: {cause}", path.display())]
+    Angles { path: PathBuf, cause: io::Error },
     #[error("--servos {0}")]
     Serial(#[from] SerialError),
     #[error(transparent)]

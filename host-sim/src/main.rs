@@ -50,8 +50,8 @@ use failure::Failure;
 /// The log target of frames. `--trace` shows it at any log level.
 const FRAMES: &str = "frames";
 
-/// With --lockstep, virtual time starts at 1 s, when the servos have already started: no virtual time passes before the first
-/// byte.
+/// With --lockstep, virtual time starts at 1 s, when the servos have already started: before the first byte, virtual time hardly
+/// passes.
 const LOCKSTEP_START: Instant = Instant::from_micros(1_000_000);
 
 fn main() -> ExitCode {
@@ -66,7 +66,6 @@ fn main() -> ExitCode {
     }
 }
 
-/// Prints an error in one line.
 fn print_error(reason: &dyn Display, status: u8) -> ExitCode {
     let _ = writeln!(io::stderr(), "error: {reason}");
     ExitCode::from(status)
@@ -135,7 +134,10 @@ fn run_servo_socket(
     signals: &mut Signals,
 ) -> Result<(), Failure> {
     let plant = plant_alone(options, clock)?;
-    let angles = options.angles.as_deref().map(AngleLog::create).transpose().map_err(Failure::Running)?;
+    let log = |path: &PathBuf| {
+        AngleLog::create(path).map_err(|cause| Failure::Angles { path: path.clone(), cause })
+    };
+    let angles = options.angles.as_ref().map(log).transpose()?;
     let socket = ServoSocket::listen(path, angles)?;
     print_ready(&[path.to_owned()]);
     socket.serve(plant, clock, signals).map_err(Failure::Running)
@@ -244,7 +246,6 @@ fn simulated_arm<C: ArmController>(
     Ok(arm)
 }
 
-/// The links to the ports of the arms.
 fn symlinks(
     options: &Options,
     numbers: &[Option<u16>],

@@ -52,6 +52,13 @@ pub enum ServosOnlyError {
     System(#[from] io::Error),
 }
 
+impl AdapterConfig {
+    /// An adapter in which no byte waits.
+    fn adapter(&self) -> UsbAdapter {
+        UsbAdapter::new(self.latency, self.seed)
+    }
+}
+
 /// The servos, their wire and the adapter, which may be unplugged.
 #[derive(Debug)]
 pub struct ServosOnly {
@@ -59,8 +66,6 @@ pub struct ServosOnly {
     plant: Plant,
     adapter: UsbAdapter,
     port: Option<AdapterPort>,
-    /// Bytes from the adapter that were not written to the port.
-    to_client: Vec<u8>,
     /// Receives the direction and the bytes on the wire.
     trace: Option<fn(&str, &[u8])>,
 }
@@ -92,8 +97,8 @@ impl ServosOnly {
         plant.ignore_collisions();
         plant.set_baud(config.baud);
         let port = Some(AdapterPort::open(config.link.as_ref())?);
-        let adapter = UsbAdapter::new(config.latency, config.seed);
-        Ok(Self { config, plant, adapter, port, to_client: Vec::new(), trace: None })
+        let adapter = config.adapter();
+        Ok(Self { config, plant, adapter, port, trace: None })
     }
 
     /// Passes direction and bytes on the wire to `trace` from now on.
@@ -134,8 +139,7 @@ impl ServosOnly {
 
     /// Unplugs or plugs in the adapter. The servos keep their power.
     fn unplug_or_plug_in(&mut self) -> Result<(), ServosOnlyError> {
-        self.to_client.clear();
-        self.adapter = UsbAdapter::new(self.config.latency, self.config.seed);
+        self.adapter = self.config.adapter();
         if self.port.take().is_some() {
             info!("adapter unplugged");
             return Ok(());
@@ -152,8 +156,7 @@ impl ServosOnly {
         self.show("<-", &bytes);
         self.adapter.push(now, &bytes);
         let block = self.adapter.take(now);
-        self.to_client.extend(block);
-        self.write_client()
+        self.write_client(&block)
     }
 
     /// Puts the bytes of the client on the wire, if the client uses the servos' baud rate.
@@ -165,7 +168,7 @@ impl ServosOnly {
         if let Some(clients) = clients {
             clients.update()?;
             if pty.update_clients(clients)? {
-                self.to_client.clear();
+                self.adapter = self.config.adapter();
             }
         }
         let bytes = bytes.get(..count).unwrap_or(&[]);
@@ -183,10 +186,9 @@ impl ServosOnly {
 
     /// Writes the bytes of the adapter to the client. A servo bus has no flow control: bytes that the client does not read are
     /// lost.
-    fn write_client(&mut self) -> io::Result<()> {
-        let bytes = std::mem::take(&mut self.to_client);
+    fn write_client(&self, bytes: &[u8]) -> io::Result<()> {
         let Some(AdapterPort { pty, .. }) = &self.port else { return Ok(()) };
-        if pty.has_client() && !bytes.is_empty() && pty.write(&bytes)? < bytes.len() {
+        if pty.has_client() && !bytes.is_empty() && pty.write(bytes)? < bytes.len() {
             debug!("the client does not read: an answer is lost");
         }
         Ok(())

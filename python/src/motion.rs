@@ -88,6 +88,10 @@ pub(crate) fn park(
     let parked = parked?.map(FineAngle::degrees);
     match (path, pose) {
         (Some(path), Some(pose)) if keep => Ok(park_poses::keep(&path, &chip, &pose).map(|()| parked)),
+        (None, Some(_)) if keep => {
+            let reason = "parked, but the pose is not kept: this user has no directory for settings";
+            Ok(Err(io::Error::new(io::ErrorKind::NotFound, reason)))
+        }
         _ => Ok(Ok(parked)),
     }
 }

@@ -203,3 +203,12 @@ def test_samples_and_recordings_wait_for_the_first_measurement() -> None:
     with sevenbot.Arm.simulated() as arm:
         recording = arm.record(1)
         assert recording.angles[0] == pytest.approx(REST, abs=3)
+
+
+def test_a_park_pose_that_cannot_be_kept_is_told(
+    simulated_arm: sevenbot.SimulatedArm, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ["HOME", "XDG_CONFIG_HOME"]:
+        monkeypatch.delenv(name, raising=False)
+    with pytest.raises(OSError, match="parked, but the pose is not kept"):
+        simulated_arm.park(None, 0, 90, 48, keep=True)

@@ -333,7 +333,8 @@ fn a_hold_is_confirmed_whatever_is_lost() {
 
 #[test]
 fn the_makers_stop_does_not_wait_for_the_commands_before_it() {
-    for waiting in [r#"{"cmd":"read","id":54,"num":7}"#, r#"{"cmd":"IK6","pos":[0,250,100],"d56":[0,0,-1]}"#]
+    for waiting in
+        [r#"{"cmd":"read","id":54,"num":7}"#, r#"{"cmd":"IK6","pos":[0,250,100],"vec56":[0,0,-1]}"#]
     {
         let mut world = moving_world();
         world.loses_replies = true;

@@ -1,11 +1,11 @@
-//! Positions, targets, speeds and durations of all joints, as typed values.
+//! Positions and targets of all joints, as typed values.
 
 use protocol_core::registers::Joint;
-use protocol_core::registers::map::{PRESENT_POSITION, SPEED, TARGET_POSITION, TIME};
+use protocol_core::registers::map::{PRESENT_POSITION, TARGET_POSITION};
 
 use crate::arm::Arm;
 use crate::error::Error;
-use crate::units::{Angle, MoveTime, Speed};
+use crate::units::Angle;
 use host_link::Span;
 
 impl Arm {
@@ -41,22 +41,5 @@ impl Arm {
     /// As [`Arm::write`].
     pub fn set_targets(&mut self, pose: [Angle; 7]) -> Result<(), Error> {
         self.write(TARGET_POSITION.address, &pose.map(Angle::degrees))
-    }
-
-    /// Sets the speeds of all joints, joint 1 first, for present and later moves.
-    ///
-    /// # Errors
-    /// As [`Arm::write`].
-    pub fn set_speeds(&mut self, speeds: [Speed; 7]) -> Result<(), Error> {
-        self.write(SPEED.address, &speeds.map(Speed::steps))
-    }
-
-    /// Sets the durations of later moves of all joints, joint 1 first. A duration applies to a joint whose speed is 0, the
-    /// maximum ([D11](protocol_core::decisions#d11)).
-    ///
-    /// # Errors
-    /// As [`Arm::write`].
-    pub fn set_times(&mut self, times: [MoveTime; 7]) -> Result<(), Error> {
-        self.write(TIME.address, &times.map(MoveTime::steps))
     }
 }

@@ -18,10 +18,9 @@ use rustix::fs::{Mode, OFlags, fchmod, fcntl_setfl, open};
 use rustix::io::Errno;
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{
-    Action, InputModes, LocalModes, OptionalActions, OutputModes, QueueSelector, Termios, ioctl_tiocnxcl,
-    tcflow, tcflush, tcgetattr, tcsetattr,
+    Action, OptionalActions, QueueSelector, Termios, ioctl_tiocnxcl, tcflow, tcflush, tcgetattr, tcsetattr,
 };
-use tracing::{debug, info, warn};
+use tracing::{info, warn};
 
 use crate::clients::{ClientWatch, Clients};
 
@@ -31,7 +30,7 @@ pub struct Pty {
     master: OwnedFd,
     terminal: OwnedFd,
     path: PathBuf,
-    /// `None` if the system does not report clients: then one client is assumed at all times.
+    /// `None` if clients are not counted: then one client is assumed at all times.
     watch: Option<ClientWatch>,
     client_count: usize,
 }
@@ -149,8 +148,7 @@ impl Pty {
         tcflow(&self.terminal, Action::OOn)?;
         ioctl_tiocnxcl(&self.terminal)?;
         let mut mode = tcgetattr(&self.terminal)?;
-        if is_unused && !is_raw(&mode) {
-            debug!("the last client left a terminal mode that alters bytes; raw again");
+        if is_unused {
             make_raw(&self.terminal, &mut mode)?;
         }
         Ok(())
@@ -160,20 +158,6 @@ impl Pty {
 fn make_raw(terminal: &OwnedFd, mode: &mut Termios) -> io::Result<()> {
     mode.make_raw();
     Ok(tcsetattr(terminal, OptionalActions::Now, mode)?)
-}
-
-/// Do all bytes pass unchanged in both directions, without an echo?
-fn is_raw(mode: &Termios) -> bool {
-    let altering = InputModes::ISTRIP
-        | InputModes::INLCR
-        | InputModes::IGNCR
-        | InputModes::ICRNL
-        | InputModes::IXON
-        | InputModes::IXOFF;
-    let processing = LocalModes::ECHO | LocalModes::ECHONL | LocalModes::ICANON | LocalModes::ISIG;
-    !mode.input_modes.intersects(altering)
-        && !mode.local_modes.intersects(processing)
-        && !mode.output_modes.contains(OutputModes::OPOST)
 }
 
 fn none_if_blocked(outcome: rustix::io::Result<usize>) -> io::Result<usize> {
@@ -190,7 +174,7 @@ mod tests {
     use std::os::unix::fs::PermissionsExt;
 
     use rustix::io::ioctl_fionread;
-    use rustix::termios::ioctl_tiocexcl;
+    use rustix::termios::{InputModes, LocalModes, ioctl_tiocexcl};
 
     use super::*;
 
@@ -290,12 +274,16 @@ mod tests {
         ioctl_tiocexcl(&visitor).unwrap();
         assert!(is_exclusive(&port.0.terminal));
         let mut mode = tcgetattr(&visitor).unwrap();
+        let raw = (mode.input_modes, mode.local_modes);
+        // Each changes bytes; PARMRK doubles the byte 0xFF.
         mode.local_modes |= LocalModes::ECHO | LocalModes::ICANON;
+        mode.input_modes |= InputModes::PARMRK;
         tcsetattr(&visitor, OptionalActions::Now, &mode).unwrap();
         drop(visitor);
         update(&mut port);
         let (pty, _) = port;
-        assert!(is_raw(&tcgetattr(&pty.terminal).unwrap()));
+        let mode = tcgetattr(&pty.terminal).unwrap();
+        assert_eq!((mode.input_modes, mode.local_modes), raw);
         // Root may open a locked terminal, so read the lock itself.
         assert!(!is_exclusive(&pty.terminal));
     }
@@ -319,7 +307,7 @@ mod tests {
     fn is_exclusive(terminal: &OwnedFd) -> bool {
         use rustix::ioctl::{Getter, ioctl, opcode};
         const TIOCGEXCL: rustix::ioctl::Opcode = opcode::read::<i32>(b'T', 0x40);
-        // SAFETY: the kernel writes one int (tty_ioctl(2)), and the getter makes room for one.
+        // SAFETY: the kernel writes one int (ioctl_tty(2)), and the getter makes room for one.
         unsafe { ioctl(terminal, Getter::<TIOCGEXCL, i32>::new()) }.unwrap() != 0
     }
 }

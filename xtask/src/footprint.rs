@@ -2,9 +2,10 @@
 //! budgets.
 
 use std::fs;
+use std::process::Command;
 
 use crate::budget::{self, Figure};
-use crate::run::{ANSWER, CHIP, ChipProgram, IMAGE, SMALL, TaskResult, link, run};
+use crate::run::{ANSWER, ChipProgram, IMAGE, SMALL, TaskResult, link, run_command};
 use linked_image::Program;
 use linked_image::{CallGraph, Depth};
 
@@ -96,5 +97,5 @@ fn print_depth(depth: &Depth) {
 fn print_hash() -> TaskResult {
     let path = IMAGE.path();
     println!("\n{} bytes of ELF, to be compared with what is flashed:", fs::metadata(&path)?.len());
-    run("sha256sum", &format!("target/{CHIP}/{}/{}", IMAGE.profile, IMAGE.name), &[])
+    run_command(Command::new("sha256sum").arg(&path))
 }

@@ -8,7 +8,7 @@ use std::process::Command;
 use kinematics::limits::check_arm;
 use kinematics::{Vector, forward};
 
-use crate::run::{TaskResult, root, run_command};
+use crate::run::{TaskResult, run_command, target_directory};
 use crate::venv;
 
 /// The version that is installed from PyPI.
@@ -21,7 +21,7 @@ const SCRIPT: &str = include_str!("mujoco.py");
 /// Installs MuJoCo into an environment of its own, and compares many poses. Fails above 0.01 mm, or if the actuators of the model
 /// do not drive the arm to a pose.
 pub(crate) fn check() -> TaskResult {
-    let folder = root().join("target/mujoco");
+    let folder = target_directory().join("mujoco");
     let python = venv::with_packages(&folder, || Ok("python3".into()), &[PACKAGE])?;
     let [script, model, poses] = ["compare.py", "7bot.xml", "poses.txt"].map(|name| folder.join(name));
     fs::write(&script, SCRIPT)?;

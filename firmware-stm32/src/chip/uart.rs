@@ -7,15 +7,15 @@
 //!          └────────────┘
 //! ```
 //!
-//! After `open` only the line accesses the registers. The loop starts a transmission by pending the interrupt, because in
-//! QEMU 7.2 an empty transmitter does not raise it.
+//! After `open` only the line and the crash handler access the registers. The loop starts a transmission by pending the
+//! interrupt, because in QEMU 7.2 an empty transmitter does not raise it.
 //!
 //! If the receive queue is full, the byte stays in the USART and the interrupt stays masked until the loop reads the
 //! queue. In the emulator the sender then waits. On a wire, an overrun occurs when the next byte is complete. Overruns
 //! and all other receive errors are counted.
 //!
-//! Both sides access the line in critical sections. The loop moves at most [`CHUNK`] bytes in a section, so that a section
-//! takes less than the 10 microseconds within which a byte of the servo bus has to be read, even on the internal oscillator.
+//! Both sides access the line in critical sections. A byte of the servo bus has to be read within 10 microseconds. So the loop
+//! moves at most [`CHUNK`] bytes in a section, which takes less than that, even on the internal oscillator.
 
 use core::cell::RefCell;
 use core::convert::Infallible;
@@ -23,7 +23,7 @@ use core::marker::PhantomData;
 
 use cortex_m::peripheral::NVIC;
 use critical_section::Mutex;
-use embedded_io::{BufRead, ErrorType, Read, ReadReady, Write, WriteReady};
+use embedded_io::{BufRead, ErrorType, Read, Write};
 use stm32f4::stm32f405 as pac;
 
 use crate::line_errors::LineErrors;
@@ -234,14 +234,6 @@ impl<U, D, const RECEIVE: usize, const TRANSMIT: usize> ErrorType for UartPort<U
     type Error = Infallible;
 }
 
-impl<U: Usart, D: BusDirection, const RECEIVE: usize, const TRANSMIT: usize> ReadReady
-    for UartPort<U, D, RECEIVE, TRANSMIT>
-{
-    fn read_ready(&mut self) -> Result<bool, Infallible> {
-        Ok(self.has_received())
-    }
-}
-
 impl<U: Usart, D: BusDirection, const RECEIVE: usize, const TRANSMIT: usize> BufRead
     for UartPort<U, D, RECEIVE, TRANSMIT>
 {
@@ -269,14 +261,6 @@ impl<U: Usart, D: BusDirection, const RECEIVE: usize, const TRANSMIT: usize> Rea
         let count = bytes.iter().zip(buffer).map(|(from, to)| *to = *from).count();
         self.consume(count);
         Ok(count)
-    }
-}
-
-impl<U: Usart, D: BusDirection, const RECEIVE: usize, const TRANSMIT: usize> WriteReady
-    for UartPort<U, D, RECEIVE, TRANSMIT>
-{
-    fn write_ready(&mut self) -> Result<bool, Infallible> {
-        Ok(self.room() > 0)
     }
 }
 

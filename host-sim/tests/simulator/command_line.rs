@@ -1,6 +1,5 @@
 //! The built simulator as a user sees it: first line, files, signals, exit statuses.
 
-#[allow(dead_code)] // Each test file uses a part of it.
 use crate::sim;
 
 use std::fs;
@@ -140,6 +139,7 @@ fn a_wrong_command_line_is_refused_in_one_line() {
         (vec!["--eeprom", "none", "--link", "/nowhere/7bot"], "/nowhere/7bot"),
         (vec!["--eeprom", "/nowhere/arm.bin"], "/nowhere/arm.bin"),
         (vec!["--servo-socket", "/nowhere/servos"], "/nowhere/servos"),
+        (vec!["--servo-socket", "servos", "--angles", "/nowhere/angles"], "--angles /nowhere/angles"),
     ] {
         let line = refused(&arguments);
         assert!(line.contains(says), "{line}");

@@ -1,6 +1,5 @@
 //! The built simulator as a servo bus behind a USB adapter: raw bytes on a port.
 
-#[allow(dead_code)] // Each test file uses a part of it.
 use crate::sim;
 
 use std::fs;

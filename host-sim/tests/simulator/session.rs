@@ -1,6 +1,5 @@
 //! `--record` and `--replay`: a session is recorded in real time and replayed in virtual time.
 
-#[allow(dead_code)] // Each test file uses a part of it.
 use crate::sim;
 
 use std::fs;

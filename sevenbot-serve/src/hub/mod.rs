@@ -8,10 +8,10 @@
 //! ```
 //!
 //! * While a read of a client has no reply, the client's later requests wait, so their order is kept. Urgent ones do not wait.
-//! * The report registers belong to each client (`own_registers`). The arm sends no reports: the sampler reads the
-//!   arm once, at the highest frequency that any client wants, and all clients share the values.
+//! * The report registers belong to each client (`own_registers`). The hub uses no reports of the arm: the sampler reads the
+//!   arm at the highest frequency that any client wants, and all clients share the values.
 //! * Without an arm requests are dropped. A request that waited could move an arm that a person just plugged in. With an arm, a
-//!   request that moves or switches something is dropped after 200 ms in the queue.
+//!   request that moves or switches something is dropped after 200 ms in the queue, unless it switches the motors off.
 //! * A stop goes before everything else, and ends the streams of the other clients (`drive`, `intent`).
 
 mod admission;
@@ -76,8 +76,8 @@ enum ArmState {
     Identifying(Instant),
     /// A 7Bot V2 answered.
     Present,
-    /// The port is open, but the arm no longer answers. The next question is due at this time. Holds are still sent, because
-    /// perhaps only the replies are lost.
+    /// The port is open, but the arm no longer answers. The next question is due at this time. Holds and writes that switch the
+    /// motors off are still sent, because perhaps only the replies are lost.
     Silent(Instant),
 }
 
@@ -109,7 +109,7 @@ pub struct Hub {
     /// Stops of all clients so far, wrapping.
     stops: u8,
     shares: Shares,
-    /// Clients with events or with room that they did not have before.
+    /// See [`Hub::take_news`].
     news: BTreeSet<ClientId>,
     options: HubOptions,
 }
@@ -174,15 +174,9 @@ impl Hub {
         self.clients.get(&id).is_some_and(Client::has_room)
     }
 
-    /// The clients that have something new since the last call: events, or room for requests.
+    /// The clients that have something new since the last call: events, room for requests, or the outcome of a hold.
     pub fn take_news(&mut self) -> BTreeSet<ClientId> {
         std::mem::take(&mut self.news)
-    }
-
-    /// Is the hub read-only, so that no write reaches the arm?
-    #[must_use]
-    pub const fn is_read_only(&self) -> bool {
-        self.options.is_read_only
     }
 
     /// States whether the client has room for the longest reply. While it has none, its reads wait.

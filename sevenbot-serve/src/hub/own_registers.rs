@@ -97,7 +97,7 @@ impl OwnRegisters {
 /// Do the `count` registers from `address` on include one of this row?
 pub(super) fn covers(row: &Register, address: u8, count: usize) -> bool {
     let (first, start) = (usize::from(row.address), usize::from(address));
-    start < first + usize::from(row.count) && first < start + count
+    count > 0 && start < first + usize::from(row.count) && first < start + count
 }
 
 /// The byte of a register in the values from `address` on.
@@ -120,6 +120,13 @@ mod tests {
         assert_eq!(reply, [1, 30, 3]);
         assert!(!own.write(Map::V22, 54, &mut [1]));
         assert!(!own.write(Map::V22, 46, &mut [90]));
+    }
+
+    #[test]
+    fn no_registers_include_none() {
+        let targets = protocol_core::registers::map::TARGET_POSITION;
+        assert!(covers(&targets, 45, 2) && covers(&targets, 52, 1));
+        assert!(!covers(&targets, 45, 1) && !covers(&targets, 53, 1) && !covers(&targets, 47, 0));
     }
 
     fn frequencies(own: &OwnRegisters) -> [u8; 3] {

@@ -18,14 +18,17 @@ const TENTHS: f64 = 10.0;
 const COARSE: f64 = 256.0 * FINE;
 /// Points of the coarsest grid on each side of its middle, along each axis.
 const COARSE_STEPS: i32 = 16;
-/// The middle of the coarsest grid: above the shoulder.
+/// The middle of the coarsest grid: on the base axis, at about the height of the shoulder.
 const MIDDLE: Vector = Vector::new(0.0, 0.0, 75.0);
 /// The spacing of the finest grid, in millimetres.
 const FINE: f64 = 1.0 / TENTHS;
 
 /// The nearest point to `tip` that is within reach with the tool in this direction, and that the guard allows. `None` if
-/// there is none.
+/// there is none, or if `tip` is no position.
 pub(super) fn nearest(tip: Vector, tool: Vector, guard: Option<&Guard>) -> Option<Vector> {
+    if !tip.is_finite() {
+        return None;
+    }
     let wish = Wish { tip, tool, guard };
     let exact = nearest_tip(tip, tool).filter(|&point| wish.is_allowed(point));
     exact.and_then(|point| wish.best(around(point, FINE, 2))).or_else(|| wish.searched())
@@ -149,6 +152,12 @@ mod tests {
                 assert!(typed.is_ok(), "{tip:?} {tool:?}: {typed:?}");
             }
         }
+    }
+
+    #[test]
+    fn nothing_is_near_to_what_is_no_position() {
+        assert_eq!(nearest(Vector::new(f64::NAN, 185.0, 50.0), DOWN, None), None);
+        assert_eq!(nearest(Vector::new(0.0, f64::INFINITY, 50.0), DOWN, None), None);
     }
 
     #[test]

@@ -13,7 +13,7 @@ use super::{DirectionText, PointText, Vector};
 pub enum TipRefusal {
     /// No angles of the joints reach the position.
     Unreachable(Unreachable),
-    /// The guard of the workspace does not allow it.
+    /// The guard of the workspace does not allow the position.
     Guarded(Box<GuardedTip>),
 }
 
@@ -95,7 +95,7 @@ pub struct Unreachable {
     /// The requested direction of the tool.
     pub tool: Vector,
     /// The nearest point that the tip reaches with this direction of the tool and that the guard, if any, allows, to a tenth
-    /// of a millimetre. `None` if there is no such point, or if the request is no position.
+    /// of a millimetre. `None` if there is no such point, or if the requested tip is no position.
     pub nearest: Option<Vector>,
     /// A usual direction of the tool with which the tip reaches the requested point; `None` if there is none.
     pub other_tool: Option<Vector>,

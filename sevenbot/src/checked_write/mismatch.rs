@@ -97,10 +97,12 @@ pub(super) fn number(address: u8, raw: u16) -> i32 {
     find_readable(address).map_or(i32::from(raw), |row| row.range.decode(raw))
 }
 
-/// The reasons as text: one line for each run of neighbouring registers with the same cause.
+/// The reasons as text: one line for each run of registers with the same cause.
 #[must_use]
 pub fn reasons(unchanged: &[WriteMismatch]) -> String {
-    let groups = unchanged.chunk_by(|one, next| one.cause == next.cause);
+    let width = |of: &WriteMismatch| find_readable(of.address).map_or(1, |row| row.range.width());
+    let is_next = |one: &WriteMismatch, next: &WriteMismatch| next.address - one.address == width(one);
+    let groups = unchanged.chunk_by(|one, next| one.cause == next.cause && is_next(one, next));
     groups.map(reason).collect::<Vec<String>>().join("\n       ")
 }
 
@@ -125,5 +127,24 @@ impl fmt::Display for WriteMismatch {
             MismatchCause::NotStored => write!(out, "{name} is {found}, but {NOT_STORED}: {cause}"),
             _ => write!(out, "{name} is {found}, not {wanted}: {cause}"),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_names_only_registers_that_were_written() {
+        let mismatch = |address| WriteMismatch { address, wanted: 9, found: 0, cause: MismatchCause::Locked };
+        // Fine targets have two bytes.
+        let text = reasons(&[11, 13, 14, 128, 130].map(mismatch));
+        let lines: Vec<_> = text.lines().map(str::trim).collect();
+        assert_eq!(lines.len(), 3, "{text}");
+        assert!(
+            lines[0].starts_with("device-id is") && lines[1].starts_with("offset.1 to offset.2"),
+            "{text}"
+        );
+        assert!(lines[2].starts_with("fine-target.1 to fine-target.2"), "{text}");
     }
 }

@@ -2,8 +2,6 @@
 
 use std::time::Duration;
 
-use protocol_core::registers::map::VACUUM_PUMP;
-
 use super::error::MoveError;
 use super::observer::{Observer, Stage};
 use crate::arm::Arm;
@@ -43,9 +41,6 @@ impl StepSink for SetPointStream<'_> {
     fn carry_out(&mut self, step: &RunStep) -> Result<(), MoveError> {
         match step {
             RunStep::Point(point) => self.send(point)?,
-            RunStep::Vacuum(is_on) => {
-                SetPointStream::arm(self).write(VACUUM_PUMP.address, &[u8::from(*is_on)])?
-            }
             other => SetPointStream::arm(self).carry_out(other)?,
         }
         Ok(self.check()?)

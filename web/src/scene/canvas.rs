@@ -28,8 +28,7 @@ pub struct Scene {
     pointer: Pointer,
     /// Rendered pixels per CSS pixel.
     ratio: f32,
-    /// `None` after the browser took the graphics context away.
-    renderer: Option<Renderer>,
+    renderer: Renderer,
     /// The last picture; `None` if the next one has to be drawn in any case.
     drawn: Option<Picture>,
     /// Set when the browser has restored a lost graphics context.
@@ -53,7 +52,7 @@ impl Scene {
         let gl = context(&canvas)?.ok_or("this browser has no WebGL2")?;
         let ratio = pixel_ratio(&gl)?;
         let arm = Arm::default();
-        let renderer = Some(Renderer::new(gl.clone(), &arm)?);
+        let renderer = Renderer::new(gl.clone(), &arm)?;
         let is_restored = watch_context(&canvas)?;
         let (camera, pointer) = (Camera::default(), Pointer::default());
         Ok(Self { canvas, gl, arm, camera, pointer, ratio, renderer, drawn: None, is_restored })
@@ -65,7 +64,7 @@ impl Scene {
     /// The graphics driver reports an error after the browser has restored a lost graphics context.
     pub fn draw(&mut self, view: &View) -> Result<bool, JsValue> {
         if self.is_restored.take() {
-            self.renderer = Some(Renderer::new(self.gl.clone(), &self.arm)?);
+            self.renderer = Renderer::new(self.gl.clone(), &self.arm)?;
             self.drawn = None;
         }
         self.resize();
@@ -74,9 +73,8 @@ impl Scene {
         if self.gl.is_context_lost() || self.drawn.as_ref() == Some(&picture) {
             return Ok(false);
         }
-        let Some(renderer) = &self.renderer else { return Ok(false) };
         let size = pixels.map(|length| i32::try_from(length).unwrap_or(i32::MAX));
-        renderer.draw(view, &self.camera, size, self.ratio);
+        self.renderer.draw(view, &self.camera, size, self.ratio);
         self.drawn = Some(picture);
         Ok(true)
     }
@@ -92,12 +90,6 @@ impl Scene {
     #[must_use]
     pub fn pick(&self, x: f32, y: f32, angles: Angles) -> Option<Part> {
         Pointer::part_at(&self.arm, &self.camera, angles, Vec2::new(x, y))
-    }
-
-    /// The camera.
-    #[must_use]
-    pub const fn camera(&self) -> &Camera {
-        &self.camera
     }
 
     /// The camera, so that the caller can move it.

@@ -8,6 +8,9 @@ use sevenbot::fine::FineTargets;
 
 use super::input::TimedPoint;
 
+/// The most points that wait: more than the input has in one period of the stream.
+const POINTS_AHEAD: usize = 16_384;
+
 /// The points that are not sent yet, and the last one whose time has come.
 #[derive(Debug, Default)]
 pub(super) struct Feed {
@@ -21,6 +24,11 @@ impl Feed {
     /// Adds a point. Its time must be later than the times of all earlier points.
     pub(super) fn push(&mut self, point: TimedPoint) {
         self.next.push_back(point);
+    }
+
+    /// False if enough points wait. Without this limit, a program that writes faster than the arm moves would fill the memory.
+    pub(super) fn has_room(&self) -> bool {
+        self.next.len() < POINTS_AHEAD
     }
 
     /// True if all points have been taken by [`Feed::take`].

@@ -12,7 +12,7 @@ use sevenbot::fine::FineTargets;
 
 use crate::printer::warn;
 
-/// The reading thread pauses while this many set-points wait to be sent.
+/// The reading thread pauses while this many set-points wait in the channel.
 const LINES_AHEAD: usize = 1_024;
 /// Later times are refused, so that the arithmetic cannot overflow.
 const LONGEST: Duration = Duration::from_secs(24 * 60 * 60);

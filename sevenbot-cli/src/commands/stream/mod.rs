@@ -188,9 +188,9 @@ struct PointSource {
 }
 
 impl PointSource {
-    /// Takes the lines that have come.
+    /// Takes the lines that have come, as many as there is room for.
     fn poll(&mut self) {
-        while self.end.is_none() {
+        while self.end.is_none() && self.feed.has_room() {
             match self.lines.try_recv() {
                 Ok(Ok(point)) => self.feed.push(point),
                 Ok(Err(reason)) => self.end = Some(Err(reason)),

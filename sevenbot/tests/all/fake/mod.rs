@@ -1,6 +1,6 @@
 //! Scripted arms on real pseudo-terminals.
 
-// No test uses all of it.
+// The tests of sevenbot-cli use a part of it.
 #![allow(dead_code)]
 
 use std::io::{ErrorKind, Read, Write};
