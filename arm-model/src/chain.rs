@@ -103,7 +103,7 @@ const ELBOW: Axes = [0.0, 0.0, REAR_ARM];
 const WRIST: Axes = [FOREARM, 0.0, ELBOW_OFFSET];
 const DISC: Axes = [TOOL, 0.0, 0.0];
 
-// Radii, and lengths that the kinematics does not need, are estimates.
+// Lengths and radii that are plain numbers here are estimates.
 pub(crate) const BASE_SOLIDS: &[Solid] = &[solid([0.0, 0.0, -BASE_HEIGHT], [0.0, 0.0, 0.0], 65.0)];
 pub(crate) const TURRET_SOLIDS: &[Solid] = &[
     solid(ORIGIN, [0.0, 0.0, SHOULDER_HEIGHT - 15.0], 45.0),

@@ -12,9 +12,9 @@
 //! are 0 in the straight pose: the arm forward, the rear arm upright, forearm and hand level. In this pose all links have the
 //! axes of the base. [`joint_angles`] converts the degrees of the registers.
 //!
-//! Shapes of URDF and MJCF are cylinders along the axes of the parts; shapes of glTF are meshes as in [`Body`]. The shapes are
-//! for display: dimensions that [`kinematics::geometry`] does not define are estimates. The three models leave out joint 7,
-//! the claw, which moves no point of the kinematics.
+//! Shapes of URDF and MJCF are cylinders along the axes of the parts; shapes of glTF are meshes as in [`Body`]. Dimensions of
+//! shapes that [`kinematics::geometry`] does not define are estimates. The three models leave out joint 7, the claw, which
+//! moves no point of the kinematics.
 //!
 //! ```
 //! let urdf = arm_model::urdf()?;
@@ -45,10 +45,10 @@ pub use urdf::urdf;
 /// The angles of joints 1 to 6 in degrees, as the registers have them, at which all joints of the model are 0.
 pub const ZERO_DEGREES: [f64; 6] = [90.0, 90.0, 65.0, 90.0, 90.0, 90.0];
 
-/// The names of joints 1 to 6 in all formats.
+/// The names of joints 1 to 6 in URDF and MJCF. The nodes of glTF have the names of the links.
 pub const JOINT_NAMES: [&str; 6] = ["joint_1", "joint_2", "joint_3", "joint_4", "joint_5", "joint_6"];
 
-/// The name of the link at the tip of the tool. Its x axis points along the tool.
+/// The name of the link at the tip of the tool; in MJCF, of a site. Its x axis points along the tool.
 pub const TIP: &str = "tip";
 
 /// Converts the angles of joints 1 to 6 from the degrees of the registers to the radians of the model.

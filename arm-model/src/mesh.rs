@@ -6,7 +6,7 @@ use crate::chain::Axes;
 
 /// Number of sides of the polygon that replaces a circle.
 const SIDES: u32 = 20;
-/// The width of the chamfer of all edges, in mm.
+/// The width of the chamfer at the edges of cylinders and plates, in mm.
 const CHAMFER: f64 = 1.2;
 
 /// The kind of part that a triangle belongs to.

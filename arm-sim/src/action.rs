@@ -11,7 +11,8 @@ use crate::faults::{ArmFault, FaultLocation};
 use crate::scene::Scene;
 use crate::servo::Trip;
 
-/// Something that is done to an arm. In the text form, times are in microseconds and positions in counts of the servo.
+/// Something that is done to an arm. In the text form, the duration of a fault is in microseconds, and the position of a hand in
+/// counts of the servo.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Action {

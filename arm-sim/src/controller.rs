@@ -27,7 +27,7 @@ pub trait ArmController: Clone + Debug {
     /// A poll can be delayed until this time without a difference for the host, unless bytes arrive earlier.
     fn host_deadline(&self) -> Instant;
 
-    /// Sets the state of the storage, after an [`Output::Save`].
+    /// Sets the state of the storage, after an [`Output::Save`] and after every change.
     fn set_storage(&mut self, storage: Storage);
 
     /// The last client has closed the port (M12).

@@ -72,7 +72,7 @@ pub enum FaultLocation {
 /// Why a text is not a fault.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum UnknownArmFault {
-    /// The part before the first `=` is not a possible location.
+    /// The text has no `=`, the part before the first `=` is not a location, or the bus or the arm has no such fault.
     #[error(
         "use JOINT=KIND with a joint from 1 to 7, bus=echo, supply=KIND, flash=KIND, line=KIND, arm=supported or \
          arm=goal-starts-torque"

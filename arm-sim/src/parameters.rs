@@ -99,7 +99,7 @@ impl ServoParameters {
         if joint.number() < 5 { &LARGE } else { &SMALL }
     }
 
-    /// The same servo with its stall torque, and with all friction and drag, scaled to these percentages.
+    /// The same servo with its stall torque, and its own friction and drag, scaled to these percentages. Friction by load stays.
     #[must_use]
     pub const fn scaled(self, torque_percent: u16, friction_percent: u16) -> Self {
         let torque = self.stall_torque * torque_percent as i64 / 100;
@@ -130,7 +130,7 @@ pub(crate) const LOAD_FRICTION_PERCENT: i64 = 5;
 pub(crate) const OVERLOAD: u16 = 800;
 /// A servo latches an overload that lasts this many milliseconds.
 pub(crate) const OVERLOAD_MS: u32 = 1_000;
-/// A servo restarts below this supply voltage, in 0.1 V.
+/// A servo is off below this supply voltage, in 0.1 V. It starts when the voltage returns.
 pub(crate) const BROWN_OUT_DECIVOLTS: u8 = 45;
 /// The temperature around the arm, in thousandths of a degree Celsius.
 pub(crate) const AMBIENT_MILLIDEGREES: u64 = 25_000;

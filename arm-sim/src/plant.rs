@@ -1,7 +1,7 @@
 //! The arm at the other end of the servo bus: seven simulated servos on one wire, under the weight of the arm.
 //!
 //! ```text
-//!   plant.bytes(now, ..) ──▶ Decoder ──▶ each Servo gets each frame
+//!   plant.bytes(now, ..) ──▶ Decoder ──▶ each Servo that the frame addresses
 //!                                             │ answers
 //!   plant.poll(now) ◀── Wire ◀────────────────┘
 //! ```
@@ -140,8 +140,7 @@ impl Plant {
         self.wire.baud()
     }
 
-    /// Takes bytes that the controller starts to send at `now`: a whole frame, or a part of one. The servos do not
-    /// receive them if a servo still drives the line.
+    /// Takes bytes that the controller starts to send at `now`. The servos do not receive them if a servo still drives the line.
     pub fn bytes(&mut self, now: Instant, bytes: &[u8]) {
         self.advance(now);
         if bytes.is_empty() {
@@ -202,7 +201,7 @@ impl Plant {
         self.wire.take(now)
     }
 
-    /// When the last byte of the next answer arrives; `None` if there is no answer. The motors need no calls at certain times:
+    /// When the last byte of the next answer or echo arrives; `None` if there is none. The motors need no calls at certain times:
     /// each call simulates the time since the call before.
     #[must_use]
     pub fn deadline(&self) -> Option<Instant> {
@@ -261,8 +260,8 @@ impl Plant {
         i32::try_from(angle).unwrap_or(0)
     }
 
-    /// The torque of a joint's motor at the last call with a time. `None` without power, and while an alarm switches
-    /// the motor off.
+    /// The torque of a joint's motor at the last call with a time. `None` without power, and while an alarm switches off a motor
+    /// whose torque switch is on.
     #[must_use]
     pub fn torque(&self, joint: Joint) -> Option<Torque> {
         self.servo(joint).and_then(|servo| servo.torque(self.now))
@@ -294,7 +293,7 @@ impl Plant {
     }
 
     /// The greatest distance between a driven joint and its set-point under the present external load, in thousandths of a
-    /// degree. `None`: the load exceeds the stall torque.
+    /// degree. `None`: load and friction reach the stall torque.
     #[must_use]
     pub fn droop(&self, joint: Joint) -> Option<i32> {
         self.servo(joint)?.droop().and_then(|droop| i32::try_from(droop).ok())

@@ -192,7 +192,7 @@ impl Scene {
         Ok(())
     }
 
-    /// Checks a new name: letters, digits and `-`, and not in use yet.
+    /// Checks a new name against the rules of [`Item::name`], and returns it.
     fn name(&self, name: &str) -> Result<String, &'static str> {
         let mut names =
             self.walls.iter().map(|wall| &wall.name).chain(self.items.iter().map(|item| &item.name));

@@ -231,7 +231,7 @@ impl Servo {
         [Torque::On, Torque::Damping].into_iter().find(has_code).unwrap_or(Torque::Free)
     }
 
-    /// The torque of the motor at `now`. `None` without power, and while an alarm switches the motor off.
+    /// The torque of the motor at `now`. `None` without power, and while an alarm switches off a motor whose torque switch is on.
     #[must_use]
     pub fn torque(&self, now: Instant) -> Option<Torque> {
         let switch = self.torque_switch();

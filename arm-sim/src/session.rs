@@ -1,5 +1,4 @@
-//! A recorded session: everything that was done to an arm from outside, and every byte that it sent, with virtual
-//! times.
+//! A recorded session: the inputs of an arm, and the bytes that the host took from the line, with virtual times.
 //!
 //! ```text
 //!   7bot-session 1 program=3.0.0 controller=sevenbot seed=1 chip-id=53494d000001 paced=true ...

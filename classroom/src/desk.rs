@@ -6,7 +6,8 @@ use crate::message::{NotGiven, ToTeacher};
 
 /// The shortest time between two messages with the state of the class.
 const PERIOD: Duration = Duration::from_millis(100);
-/// The time between two of these messages while nothing but the remaining time of a lease changes.
+/// The time between two of these messages without an event in the class. The time of a lease, and which tabs are silent, still
+/// change then.
 const LONGEST_PERIOD: Duration = Duration::from_millis(500);
 
 #[derive(Debug, Default)]

@@ -1,5 +1,5 @@
-//! The messages of a class, as JSON. A pupil's messages have bounded types: the class parses them before it passes their
-//! content to the teacher.
+//! The messages of a class, as JSON. The class parses a pupil's messages before it passes their content to the teacher: the types
+//! of a report bound its size, and [`crate::name::clean`] bounds names.
 
 use serde::{Deserialize, Serialize};
 
@@ -78,7 +78,7 @@ pub enum Doing {
     StopFailed,
     /// Its motors are off or damped.
     Limp,
-    /// A joint is held back by something.
+    /// A joint does not reach its target: something blocks it, or its servo has let go.
     Blocked,
     /// Something else is wrong.
     Problem,
@@ -167,7 +167,7 @@ pub struct LentArm {
 pub enum LeaseEnd {
     /// The time is over.
     Time,
-    /// The teacher took it back, or gave it to another pupil.
+    /// The teacher took it back, or began a new lease.
     TakenBack,
     /// The connection of the tab was lost, the tab did not answer for 8 s, or the pupil joined in another tab.
     Lost,

@@ -1,4 +1,4 @@
-//! A pupil: the present or last connection of its tab, the last report, and the messages that are due.
+//! A pupil: the connection of its tab, the last report, and the messages that are due.
 
 use protocol_core::time::{Duration, Instant};
 
@@ -24,7 +24,7 @@ pub(crate) struct Pupil {
     report: Option<Report>,
     /// When the tab was asked last.
     asked: Instant,
-    /// When the tab answered last, or joined again.
+    /// When the tab answered last, or joined.
     answered: Instant,
     is_ask_due: bool,
     waits_for_answer: bool,
@@ -54,8 +54,8 @@ impl Pupil {
         }
     }
 
-    /// Moves the pupil to a new connection under this name, and makes all messages due again. Returns the old connection if
-    /// it is still open.
+    /// Moves the pupil to a new connection under this name, and makes all messages due again, except a confirmed stop. Returns the
+    /// old connection if it is still open.
     pub(crate) fn rejoin(
         &mut self,
         now: Instant,
@@ -108,7 +108,6 @@ impl Pupil {
         self.stop.as_mut().is_some_and(|stop| stop.confirm(number, outcome))
     }
 
-    /// Makes the next question due if it is time for it.
     pub(crate) fn poll(&mut self, now: Instant) {
         let since = now - self.asked;
         self.is_ask_due |= since >= if self.waits_for_answer { ASK_AGAIN } else { ASK_PERIOD };

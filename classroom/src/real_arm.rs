@@ -26,7 +26,8 @@ pub struct ArmNews {
 pub(crate) struct RealArm {
     news: ArmNews,
     hold: Option<PendingStop>,
-    /// The state of the last stop for all at this arm; `None` before the first.
+    /// `Asked` from a stop for all until a hold is confirmed; then the outcome of the last confirmed hold. `None` before the
+    /// first of either.
     pub(crate) stop: Option<TileStop>,
     lease: Option<Lease>,
     leases: u32,

@@ -20,7 +20,7 @@ impl PauseWait {
     }
 
     /// True if the wait is over at `now`. `received` is the number of bytes in the receive queues, which must not be read
-    /// during the wait. While `is_sending`, the line is not quiet, because an answer may follow.
+    /// during the wait. While the servo bus `is_sending`, the quiet time begins anew, because an answer may follow.
     pub const fn is_over(&mut self, now: u32, received: usize, is_sending: bool) -> bool {
         if received != self.received || is_sending {
             self.received = received;

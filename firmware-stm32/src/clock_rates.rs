@@ -8,7 +8,7 @@ use protocol_core::registers::map::fault;
 pub enum ClockSource {
     /// The crystal, through the PLL: the normal case.
     Crystal,
-    /// The internal oscillator, through the PLL: the crystal failed.
+    /// The internal oscillator, through the PLL: no crystal can be used.
     InternalPll,
     /// The internal oscillator: the PLL failed.
     Internal,

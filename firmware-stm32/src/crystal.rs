@@ -22,7 +22,7 @@ const CYCLES: u32 = DIVIDER as u32 * PERIODS_PER_CAPTURE * CAPTURES;
 const TOLERANCE: u32 = 5;
 
 /// Measures the crystal, in kHz. `capture` returns the next captured count of a timer at the internal oscillator's frequency.
-/// `None` if `capture` returns `None`: no capture came in time, or one was missed.
+/// `None` if `capture` returns `None` (no capture came in time, or one was missed), or if the count stands still.
 pub fn measure_khz(mut capture: impl FnMut() -> Option<u16>) -> Option<u32> {
     // Drop the first capture: it may belong to the time before the timer was set up.
     capture()?;

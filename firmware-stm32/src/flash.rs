@@ -1,11 +1,11 @@
 //! The two journal sectors as a NOR flash (RM0090, sections 3.6 and 3.9). This file does not know what is stored there, and
 //! accesses the chip only through [`FlashRegisters`].
 //!
-//! The core stalls while a word is programmed (16 microseconds) or a sector is erased (up to 0.8 s), because it fetches
+//! The core stalls while a word is programmed (16 to 100 microseconds) or a sector is erased (up to 0.8 s), because it fetches
 //! its instructions from the same bank. Interrupts run between two words. Sectors are erased only at start, before the
 //! servos are controlled.
 //!
-//! Each programmed word is read back, and a difference is an error. It occurs in the emulator, where no cell changes. A write
+//! Each programmed word is read back, and a difference is an error, which occurs in the emulator: no cell changes there. A write
 //! also updates the data cache, so the cache is flushed before the read.
 //! Tests: `flash/tests.rs`.
 
@@ -33,7 +33,7 @@ pub const SUPPLY_LEVEL: u8 = 6;
 /// Start-up time of the supply monitor, in microseconds. The datasheet gives no figure, so this is an assumption.
 pub const SUPPLY_SETTLING_MICROS: u32 = 100;
 
-/// Bits of FLASH_CR (RM0090, section 3.9.5).
+/// Bits of FLASH_CR (RM0090, section 3.9).
 pub mod control {
     /// PG: a write to a cell programs it.
     pub const PROGRAM: u32 = 1 << 0;
@@ -49,7 +49,7 @@ pub mod control {
     pub const LOCK: u32 = 1 << 31;
 }
 
-/// Bits of FLASH_SR (RM0090, section 3.9.4).
+/// Bits of FLASH_SR (RM0090, section 3.9).
 pub mod status {
     /// BSY: an operation is running.
     pub const BUSY: u32 = 1 << 16;

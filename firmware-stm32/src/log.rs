@@ -1,5 +1,5 @@
-//! The log of the main loop. defmt-rtt masks all interrupts for a whole line, so log lines are written while both
-//! serial lines pause, at most one in each pass of the loop.
+//! The log of the main loop. defmt-rtt masks all interrupts for a whole log line. So the loop writes at most one in each pass,
+//! while both serial lines pause or a debugger is attached.
 
 use cortex_m::peripheral::DCB;
 use firmware_stm32::chip::host_link::HostLink;
@@ -8,7 +8,7 @@ use firmware_stm32::log_gate::LogGate;
 use motion_core::{Controller, Storage, Vacuum};
 use protocol_core::time::{Duration, Instant};
 
-/// Time between two groups of lines about the serial lines.
+/// Time between two groups of log lines about the serial lines.
 const PERIOD: Duration = Duration::from_millis(1_000);
 
 /// The next log line about the serial lines. The three follow each other in this order.
@@ -65,7 +65,7 @@ impl Log {
         self.due = Instant::ZERO;
     }
 
-    /// True if a line waits for a pause.
+    /// True if a log line waits for a pause.
     pub(crate) fn is_due(&self, now: Instant) -> bool {
         now >= self.due
     }

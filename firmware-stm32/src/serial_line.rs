@@ -44,7 +44,7 @@ pub trait UsartRegisters {
 
 /// The direction of the buffer of a bus.
 pub trait BusDirection {
-    /// False for a line without such a buffer: then neither function is called.
+    /// False for a line without such a buffer: the line then calls neither function.
     const IS_SWITCHED: bool;
     /// Makes the board drive the bus.
     fn transmit(&mut self);
@@ -122,7 +122,7 @@ impl<U: UsartRegisters, D: BusDirection, const RECEIVE: usize, const TRANSMIT: u
         is_taken
     }
 
-    /// Moves a received byte to the queue. Returns false if the queue is full.
+    /// Moves a received byte to the queue. Returns false if the byte stays in the USART, because the queue is full.
     fn receive(&mut self, status: u16) -> bool {
         let seen = status & (status::RECEIVED | status::ERRORS);
         if seen == 0 {
@@ -185,7 +185,8 @@ impl<U: UsartRegisters, D: BusDirection, const RECEIVE: usize, const TRANSMIT: u
         }
     }
 
-    /// Queues as many of `bytes` as there is room for, and returns how many. If it queued any, pend the interrupt.
+    /// Queues as many of `bytes` as there is room for, and returns how many. If any, the caller has to pend the
+    /// interrupt.
     pub fn push(&mut self, bytes: &[u8]) -> usize {
         let count = self.to_send.push_all(bytes);
         if count > 0 {

@@ -18,7 +18,7 @@ use protocol_core::registers::JOINTS;
 
 use crate::read_only_bus::ReadOnlyBus;
 
-/// Frames that step b sends.
+/// Frames that step b sends, unless the bus gives no echo.
 const ECHOES: u16 = 1_000;
 /// Questions that step c sends.
 const QUESTIONS: u16 = 100;
@@ -56,7 +56,6 @@ pub(crate) struct Board {
     pub(crate) reference: Option<u16>,
 }
 
-/// The self-test of a board.
 pub(crate) struct SelfTest {
     pub(crate) board: Board,
     pub(crate) clock: Clock,
@@ -113,7 +112,6 @@ impl SelfTest {
         }
     }
 
-    /// Updates the LED and feeds the watchdog.
     fn feed_and_blink(&mut self) {
         let (step, passed) = self.shown;
         self.led.set(led_pattern::is_on(step, passed, self.clock.now().as_micros()));

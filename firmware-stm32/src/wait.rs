@@ -10,7 +10,7 @@ pub fn wait_for(polls: u32, flag: impl Fn() -> bool) -> bool {
 pub fn wait_within(limit_micros: u32, micros: impl Fn() -> u32, flag: impl Fn() -> bool) -> bool {
     let start = micros();
     loop {
-        // Read the time first: then the flag is polled once more after a pause that is longer than the limit.
+        // Read the time before the flag: so the flag is polled once more, even if an interrupt took longer than the limit.
         let is_over = micros().wrapping_sub(start) >= limit_micros;
         if flag() {
             return true;

@@ -20,7 +20,7 @@ impl WatchdogGate {
         self.control_cycle = true;
     }
 
-    /// Records that the host link passed its bytes to the controller.
+    /// Records that the host link passed bytes to the controller, or had none to pass.
     pub fn host_link_ran(&mut self) {
         self.host_link = true;
     }

@@ -34,8 +34,8 @@ pub enum HostEvent {
     Report(Map, Snapshot),
     /// An alarm of the arm ([M8](protocol_core::decisions#m8)).
     Alarm(Alarm),
-    /// A good frame that answers no open read: a late reply, or the echo of a write on a one-wire line. The echo of a
-    /// read lacks the values of a reply, so it is [`HostEvent::Damaged`].
+    /// A good frame that answers no open read: a late reply, the reply to a read that the link sent for itself, or the echo of a
+    /// write on a one-wire line. The echo of a read lacks the values of a reply, so it is [`HostEvent::Damaged`].
     Unmatched(Function, Snapshot),
     /// A frame was damaged.
     Damaged(Defect),

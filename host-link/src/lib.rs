@@ -11,8 +11,8 @@
 //!
 //! The crate reads no clock and opens no port: time and bytes are arguments. The blocking library, the hub of
 //! `sevenbot serve` and the page in a browser are shells round it. It does not know what the registers of the arm mean,
-//! except for two things that all shells share: the registers of a server ([`sharing`]), and the limits that a stop has to
-//! keep ([`keep_limits`]).
+//! except for three things that all shells share: the layout versions of their blocks ([`Snapshot`]), the registers of a
+//! server ([`sharing`]), and the limits that a stop has to keep ([`keep_limits`]).
 //!
 //! ```
 //! use host_link::{HostEvent, HostLink, LinkOptions, Patience, Span};

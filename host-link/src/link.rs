@@ -17,9 +17,9 @@ use crate::pending_reads::{Matched, PendingReads, Wait};
 use crate::snapshot::Snapshot;
 use crate::span::Span;
 
-/// Markers that are sent for a read. If no reply to them comes, the read is sent all the same.
+/// At most this many markers are sent for a read. If no reply to them comes, the read is sent all the same.
 const MOST_MARKERS: u32 = 3;
-/// The register that a marker reads, and some registers behind it.
+/// The register that a marker reads. A marker behind others reads some registers more.
 const MARKED: Span = Span::of(&DEVICE_CODE);
 
 /// The line, and what the arm may send without a request.
@@ -269,8 +269,8 @@ impl HostLink {
         });
     }
 
-    /// The reply to a later read came first, so this one is lost ([D5](protocol_core::decisions#d5)). It is repeated at
-    /// once if a repeat is allowed and none is on its way.
+    /// The reply to a later read came first, so the reply to this read is lost ([D5](protocol_core::decisions#d5)). If no
+    /// repeat is on its way, the read is repeated at once or, if it may not be repeated, given up.
     fn lose(&mut self, id: RequestId) {
         if self.pending.awaits(id) {
             return;

@@ -7,8 +7,8 @@
 //! * No two reads on their way have the same range: the second asks for a few registers more. This also keeps a read of the
 //!   present positions apart from a report ([D14](protocol_core::decisions#d14)).
 //! * A read that was given up stays in the list, so that its late reply is recognised.
-//! * Where no other range is left, a new read waits until it is known whether a reply to the old one comes: the reply to a
-//!   marker, a read of another range behind it, tells.
+//! * Where no other range is left, a new read waits until it is known whether a reply to the old one comes. The reply to a
+//!   marker tells: a marker is a read of another range, sent behind the old read.
 
 use std::collections::VecDeque;
 
@@ -24,7 +24,7 @@ const REMEMBERED: usize = 64;
 /// A read that was sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct SentRead {
-    /// `None` once it was given up, and for a marker.
+    /// `None` once it was given up or answered, and for a marker.
     id: Option<RequestId>,
     asked: Span,
     /// When its reply has arrived, if the arm answers at once.
@@ -40,7 +40,7 @@ pub(crate) struct PendingReads(VecDeque<SentRead>);
 /// The read that a reply answers.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Matched {
-    /// The read that the reply answers; `None` if the read was given up.
+    /// The read that the reply answers; `None` if the read was given up or answered before, or is a marker.
     pub(crate) id: Option<RequestId>,
     /// When the reply was due; `None` if a later attempt has the same range, so that the reply may be to that one.
     pub(crate) due: Option<Instant>,

@@ -93,7 +93,7 @@ impl<F: NorFlash + Clone, C: ArmController> EventLoop<F, C> {
     /// Runs until a signal ends it.
     ///
     /// # Errors
-    /// The operating system fails: inotify, epoll, accepting a client of a control socket, or the port of the last arm.
+    /// The operating system fails: poll(2), inotify, epoll, accepting a client of a control socket, or the port of the last arm.
     pub fn run(mut self, clock: &mut VirtualClock, signals: &mut Signals) -> io::Result<()> {
         epoll::add(&self.epoll, signals.as_fd(), EventData::new_u64(SIGNALS), EventFlags::IN)?;
         loop {
@@ -133,7 +133,7 @@ impl<F: NorFlash + Clone, C: ArmController> EventLoop<F, C> {
         self.arms.iter().any(|entry| !entry.has_failed && entry.arm.is_host_line_busy())
     }
 
-    /// Sleeps until an event, at most for this time. poll(2) is slow with many ports, and epoll_wait(2) has no timeouts below a
+    /// Sleeps until an event, at most for this time. poll(2) is slow with many ports, and epoll(7) has no timeouts below a
     /// millisecond before Linux 5.11. So poll(2) waits for the epoll instance.
     fn wait<'space>(
         &self,
@@ -172,7 +172,7 @@ impl<F: NorFlash + Clone, C: ArmController> EventLoop<F, C> {
         }
     }
 
-    /// Makes an arm due at once if clients opened or closed its port.
+    /// Makes an arm due at once if a client opened its port, or the last client closed it.
     fn wake_arms_with_news(&mut self, now: Instant) {
         let Some(clients) = &mut self.clients else { return };
         if clients.take_has_changed() {

@@ -232,7 +232,7 @@ impl<F: NorFlash + Clone, B: ServoBus, C: ArmController> PtyArm<F, B, C> {
         Ok(has_delivered)
     }
 
-    /// Did clients open or close the port since the last [`PtyArm::poll`]?
+    /// Did a client open the port, or the last client close it, since the last [`PtyArm::poll`]?
     #[must_use]
     pub fn has_news(&self, clients: &Clients) -> bool {
         self.pty.has_news(clients)

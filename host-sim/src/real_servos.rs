@@ -38,7 +38,7 @@ const FIRST_REPORT: Duration = Duration::from_millis(2_000);
 const REPORT_PERIOD: Duration = Duration::from_millis(10_000);
 /// The period of attempts to open the port after the adapter was unplugged.
 const SEARCH_PERIOD: Duration = Duration::from_millis(500);
-/// The frame that damps the servos is sent this many times, as after a fault of the controller.
+/// The frame that damps the servos is sent this many times, because a frame that collides with an answer is lost.
 const REPEATS: usize = 3;
 /// The pause before each of these frames: longer than a servo needs to answer.
 const PAUSE: std::time::Duration = std::time::Duration::from_millis(5);
@@ -214,7 +214,6 @@ impl<F: NorFlash + Clone> RealServos<F> {
             Joint::ALL.map(|joint| (joint.index(), [code])).into_iter(),
         );
         for _ in 0..REPEATS {
-            // A frame that collides with an answer is lost.
             sleep(PAUSE);
             let sent = serial.write(&frame).and_then(|_| serial.drain());
             if let Err(error) = sent {

@@ -42,7 +42,7 @@ impl Signals {
         warn!("SIGUSR1 is ignored: only with --servos-only there is an adapter to unplug");
     }
 
-    /// The actions since the last call, each at most once. [`SignalAction::End`] is the last.
+    /// The actions since the last call, at most one for each signal. [`SignalAction::End`] is the last.
     pub fn actions(&mut self) -> Vec<SignalAction> {
         let action = |signal| match signal {
             SIGHUP => SignalAction::PowerCycle,

@@ -27,7 +27,7 @@ pub struct Trace {
 }
 
 impl Trace {
-    /// Passes a line for each frame to `sink`.
+    /// Passes a line for each frame, and for bytes that are no frame, to `sink`.
     #[must_use]
     pub fn new(sink: Box<dyn FnMut(&str) + Send>) -> Self {
         let gap = Duration::ZERO;

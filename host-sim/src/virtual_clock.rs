@@ -79,7 +79,7 @@ impl VirtualClock {
         Self { now: start, lockstep, ..Self::default() }
     }
 
-    /// The virtual time at the last tick.
+    /// The virtual time after the last [`VirtualClock::tick`] or [`VirtualClock::set_now`].
     #[must_use]
     pub const fn now(&self) -> Instant {
         self.now

@@ -54,7 +54,7 @@ fn other_heading<F: Float>(wrist: Vector<F>, [t1, ..]: [F; 3]) -> Option<[F; 3]>
     Some([t1, t2, t3])
 }
 
-/// Joints 4 and 5 for the same direction of the tool, with joint 4 turned by half a turn; `None` out of its range.
+/// Joints 4 and 5 for the same direction of the tool, with joint 4 turned by half a turn; `None` if joint 4 cannot turn there.
 fn other_roll<F: Float>([t4, t5]: [F; 2]) -> Option<[F; 2]> {
     Some([opposite(t4)?, F::of(180.0) - t5])
 }

@@ -1,6 +1,6 @@
 //! Floating point on chip and host. Only exactly rounded operations and `libm` are used: all machines get the same bits.
 //!
-//! All public angles are degrees, so sine and cosine take degrees and are exact at multiples of 90.
+//! The angles of the joints are degrees, so sine and cosine take degrees. They are exact at multiples of 90 from -180 to 180.
 
 use core::fmt::Debug;
 use core::ops::{Add, Div, Mul, Neg, Sub};

@@ -137,8 +137,8 @@ mod tests {
         Vector::new(x, y, z)
     }
 
-    /// The rear arm is upright, the forearm level, and the hand in line with it. Quarter turns are exact, so all coordinates
-    /// are.
+    /// The rear arm is upright, the forearm level, and the hand in line with it. All coordinates are exact, because quarter turns
+    /// are exact.
     #[test]
     fn the_frames_of_the_straight_pose() {
         let Frames { arm, hand } = forward([90.0, 90.0, 65.0, 90.0, 90.0, 90.0]);

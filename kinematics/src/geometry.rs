@@ -34,7 +34,7 @@ pub const FOREARM: f64 = 198.5;
 pub const TOOL: f64 = 22.46;
 /// Radius of the disc that joint 6 turns.
 pub const DISC_RADIUS: f64 = 20.0;
-/// From the shoulder axis to the end of the parallelogram's lever. The lever moves no other point.
+/// From the shoulder axis to the end of the parallelogram's lever. No other point depends on this length.
 pub const LEVER: f64 = 40.0;
 /// From the top plate down to the foot of the base; an estimate. The foot stands on the table.
 pub const BASE_HEIGHT: f64 = 60.0;
@@ -44,7 +44,7 @@ pub const BASE_RADIUS: f64 = 78.0;
 /// The axes of the claw's fingers: their distance from the disc along the tool, and from the tool's axis to either side; an
 /// estimate.
 pub const FINGER_AXIS: [f64; 2] = [14.0, 11.0];
-/// The bend of a finger: along the tool and outward from its axis, with the claw closed; an estimate.
+/// The bend of a finger with the claw closed, from the axis of the finger: along the tool, and outward; an estimate.
 pub const FINGER_BEND: [f64; 2] = [22.0, 6.0];
 /// The end of a finger, in the coordinates of [`FINGER_BEND`]; an estimate.
 pub const FINGER_END: [f64; 2] = [52.0, -7.0];

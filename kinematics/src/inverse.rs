@@ -8,7 +8,7 @@
 //!
 //! Two headings bring the wrist to a point: towards the point, and away from it, with the wrist behind the base axis. Joint 1
 //! reaches one of these headings, or both where y is 0. The parallelogram allows one of the two bends of the elbow, and joint 4
-//! one of the two rolls of the hand. So there is one solution, except in the cases that [`ik5`] and [`ik6`] name.
+//! one of the two rolls of the hand. So there is at most one solution, except in the cases that [`ik5`] and [`ik6`] name.
 
 use crate::float::Float;
 use crate::forward::{ArmFrames, HandFrames};
@@ -31,7 +31,7 @@ pub enum NoSolution {
     TooNear,
     /// The joint of this number, 1 to 3, would have to turn beyond 0 or 180 degrees.
     Joint(u8),
-    /// The wrist is within reach, but the hand cannot bend far enough back to point the tool there.
+    /// The wrist is within reach, but the hand cannot bend far enough back for the direction of the tool.
     ToolDirection,
     /// The wrist is on the base axis, where joint 1 has no defined angle.
     NoHeading,

@@ -8,7 +8,7 @@
 //!   tip, tool, disc ────────▶ ik7 ──▶ [T1 .. T6]
 //!
 //!   point out of reach ─────▶ nearest ──▶ the nearest point within reach
-//!   [T1 .. T5] ─────────────▶ workspace ──▶ the distance from the table and from the base
+//!   [T1 .. T5] ─────────────▶ workspace ──▶ the smallest distance from the table or the base
 //! ```
 //!
 //! T1 to T7 are the angles of joints 1 to 7 in degrees, as the registers have them. T7, the claw, moves no point.

@@ -1,6 +1,6 @@
 //! Which angles the arm can take: each joint, the parallelogram of joints 2 and 3, and the claw.
 //!
-//! An angle at a limit is legal. Because of rounding, a solution may be beyond a limit by [`TOLERANCE`].
+//! An angle at a limit is legal. Because of rounding, a solution may be beyond a limit by up to [`TOLERANCE`].
 
 use crate::float::Float;
 use crate::geometry::{CLAW_MAX, JOINT_MAX, LEVEL_FOREARM, LINKAGE_MAX, LINKAGE_MIN};

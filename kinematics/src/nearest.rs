@@ -8,9 +8,9 @@
 //!   linkage = 19, linkage = 161 circle round the shoulder
 //! ```
 //!
-//! Joint 1 turns the plane. The nearest plane is the plane through the requested point, or a plane at an end of joint 1. In a
-//! plane, the nearest point is the projection of the requested point on the plane, its projection on an arc, or a corner
-//! between two arcs.
+//! Joint 1 turns the plane. The nearest point is in the plane through the requested point, or in a plane at an end of joint 1.
+//! In a plane, it is the projection of the requested point on the plane, its projection on an arc, or a corner between two
+//! arcs.
 
 use core::iter::once;
 

@@ -11,7 +11,7 @@
 //! The cylinder of the base has no lower end: below the foot is the support of the base. The turret above the base
 //! needs no check: the linkage keeps the wrist 106 mm from the shoulder, and the elbow is never below the shoulder.
 //!
-//! This file knows neither paths nor joint limits. [`crate::limits`] checks those.
+//! This file knows neither paths nor joint limits. [`crate::limits`] checks the limits.
 
 use crate::float::Float;
 use crate::forward::{ArmFrames, Frames, HandFrames};
@@ -155,8 +155,8 @@ fn segment_from_base(from: Vector<f64>, to: Vector<f64>) -> f64 {
     let at = |share: f64| distance_from_base(from + (to - from) * share);
     let ends = at(0.0).min(at(1.0));
     if from.z.min(to.z) > KEEP_OUT_TOP {
-        // No point of the line is lower than its ends, so all are above the cylinder. The smallest distance may be less than
-        // this.
+        // No point of the line is lower than its ends, so all are above the cylinder. A point between the ends may be nearer
+        // than both ends, but its distance is positive.
         return ends;
     }
     let (mut low, mut high) = (0.0, 1.0);

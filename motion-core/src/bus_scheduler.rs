@@ -140,13 +140,13 @@ impl BusScheduler {
         self.torque_due |= self.torque_refresh_in == 0;
     }
 
-    /// Schedules goals, because the set-points have advanced.
+    /// Schedules goals, because the set-points have advanced or a joint engaged.
     pub(crate) fn goals_changed(&mut self) {
         self.goals_due = self.goals_due.max(1);
     }
 
     /// Prepares the next frame if one is due and the bus is free. Returns whether there is a frame to send. Before a new
-    /// goal or torque, joints whose measurement is too old wait again ([`Joints::expire_pending`]).
+    /// goal or torque, a joint whose measurement is too old stops engaging ([`Joints::expire_pending`]).
     pub(crate) fn prepare_frame(
         &mut self,
         now: Instant,

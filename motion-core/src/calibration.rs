@@ -11,7 +11,7 @@
 
 use protocol_core::registers::Joint;
 
-/// An angle in millionths of a degree, the unit of all positions in this crate ([D18](protocol_core::decisions#d18)).
+/// An angle in millionths of a degree, the unit of joint positions in this crate ([D18](protocol_core::decisions#d18)).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

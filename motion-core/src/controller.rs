@@ -150,8 +150,8 @@ impl Controller {
         }
     }
 
-    /// When the next report is due, or silence on the line has an effect. Unless bytes come, a late `poll` before this time
-    /// makes no difference to the host. A late shell still has to call `poll` for each deadline that it missed.
+    /// When the next report is due, or silence on the line has an effect. A `poll` that is late, but comes before this time,
+    /// makes no difference to the host unless bytes came. A late shell still has to call `poll` for each deadline that it missed.
     #[must_use]
     pub fn host_deadline(&self) -> Instant {
         self.host.deadline()
@@ -193,8 +193,8 @@ impl Controller {
         self.host.baud()
     }
 
-    /// The registers. The measurements in the extended block and the protection block are updated only when they are
-    /// sent to the host.
+    /// The registers. The values of the joints in the extended block and the protection block are updated only when they
+    /// are sent to the host.
     #[must_use]
     pub const fn registers(&self) -> &RegisterFile {
         &self.arm.registers

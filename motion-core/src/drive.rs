@@ -31,8 +31,8 @@ enum Engagement {
     /// The joint will engage at the next measurement. If the host writes a target meanwhile (`has_target`), the trajectory
     /// keeps it.
     Waiting { has_target: bool },
-    /// The goal of the joint is its measured position, or its set-point if the joint continues after a silence. The joint
-    /// has no torque yet, unless its servo kept the torque during the silence.
+    /// The goal of the joint is the angle at which it engages, or its set-point if it continues after a silence. The servo has
+    /// no torque yet, unless it kept its torque during a silence or a restart of the controller.
     TorquePending { was_silent: bool, has_new_target: bool },
     /// The joint has torque and follows its set-point.
     Engaged,

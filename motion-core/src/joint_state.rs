@@ -207,7 +207,7 @@ impl JointState {
         }
     }
 
-    /// Lets the target of a joint that is let go follow its position, unless the host wrote a target.
+    /// Lets the target of a joint that is let go follow its position, unless the host wrote a target or the protection is off.
     fn follow(&mut self, now: Instant, answer: &Answer, angle: MicroDegrees, registers: &mut RegisterFile) {
         self.let_go.follow(now, answer);
         if registers.get(PROTECTION.address) != 0 && !self.drive.is_moving() {

@@ -244,8 +244,8 @@ impl Joints {
         }
     }
 
-    /// Lets joints whose torque is pending wait again if their measurement is too old. After a late call they may no
-    /// longer be where they were measured.
+    /// Lets joints whose torque is pending wait again, or be silent again, if their measurement is too old. After a late call
+    /// they may no longer be where they were measured.
     pub(crate) fn expire_pending(&mut self, now: Instant) {
         for (_, state) in self.each_mut() {
             if state.drive.is_torque_pending() && !state.position.is_fresh(now) {
@@ -254,7 +254,8 @@ impl Joints {
         }
     }
 
-    /// Advances all set-points at `now` by the control cycle that ends at `end`. Returns whether any joint takes goals.
+    /// Advances the set-points of the joints that take goals by the control cycle that ends at `end`. Returns whether there is
+    /// such a joint.
     pub(crate) fn advance(&mut self, now: Instant, end: Instant, registers: &mut RegisterFile) -> bool {
         self.doubt_torque(now);
         let before = self.kept_linkage(registers);

@@ -211,7 +211,7 @@ mod tests {
 
     const SET_POINT: i32 = 90_000_000;
 
-    /// An answer without load and with an alarm of the supply voltage. This alarm frees no servo by itself.
+    /// An answer without load and with an alarm of the supply voltage.
     fn answer() -> Answer {
         let reading = Reading {
             position_counts: 511,

@@ -85,5 +85,5 @@ pub use protocol_core::settings::Storage;
 pub use servo_bus::TorqueCodes;
 pub use vacuum::Vacuum;
 
-/// The control cycle: every 10 ms each driven joint gets a new goal and each servo is read once.
+/// The control cycle: every 10 ms the driven joints get new goals, and the servos are read.
 pub const CYCLE: Duration = Duration::from_millis(10);

@@ -8,7 +8,8 @@ use protocol_core::time::{Duration, Instant};
 use crate::calibration::MicroDegrees;
 use crate::push_limiter::{PushLimit, PushLimiter, PushSample};
 
-/// A joint that is held back for this long, and comes no nearer to its target, is blocked.
+/// A joint that is held back for this long, and comes no nearer to its target, is blocked. A blocked joint tries again for this
+/// long after each point of a stream.
 const BLOCKED_AFTER: Duration = Duration::from_millis(1_000);
 /// [`BLOCKED_AFTER`] in control cycles of 10 ms.
 const BLOCKED_AFTER_CYCLES: u8 = 100;

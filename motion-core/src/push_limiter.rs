@@ -20,7 +20,7 @@ use crate::calibration::MicroDegrees;
 /// The limit of a joint's push.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PushLimit {
-    /// The limit of a joint that carries the arm, in 0.1 % of the stall torque.
+    /// The limit of a joint that is not a claw, in 0.1 % of the stall torque.
     Arm(i16),
     /// The limit of the claw, in 0.1 % of the stall torque. The claw carries no load, but may break what it holds.
     Grip(i16),

@@ -1,8 +1,9 @@
 //! The set-point of one joint during a move or in a stream ([D10](protocol_core::decisions#d10),
 //! [D11](protocol_core::decisions#d11), [D18](protocol_core::decisions#d18), [D23](protocol_core::decisions#d23)).
 //!
-//! Each control cycle advances the set-point by one step. A late call delays the move; it never makes a step larger.
-//! This file does not know the joint, its measured position or its servo.
+//! Each control cycle advances the set-point by one step. A late call delays a move; it never makes a step larger. After
+//! a late call in a stream, a step may be as large as the speed of the joint allows. This file does not know the joint,
+//! its measured position or its servo.
 
 use protocol_core::time::{Duration, Instant};
 

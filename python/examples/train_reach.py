@@ -3,8 +3,8 @@
     pip install "./python[gym]"
     python python/examples/train_reach.py
 
-Each generation tries 128 pairs of policies, one changed by a random step and one by its opposite, all on the same goals, and
-moves the policy towards the better ones. Ctrl-C ends the training early.
+Each generation tries 128 pairs of policies, one changed by a random step and one by its opposite, and moves the policy towards
+the better ones. The two policies of a pair have the same goal. Ctrl-C ends the training early.
 """
 
 from __future__ import annotations

@@ -214,7 +214,7 @@ class Arm:
         """The registers as a mapping: `arm.registers["speed.1"] = 10`."""
     @property
     def angles(self) -> _Angles:
-        """The measured angles in degrees, joint 1 first: in steps of 0.01 with this project's firmware, else of 1.
+        """The measured angles in degrees, joint 1 first: in steps of 0.01 with this project's firmware and map 2.2, else of 1.
 
         Raises `ArmProblem` if a servo does not answer, because its angle is unknown then; `status()` has the others.
         """
@@ -234,7 +234,7 @@ class Arm:
     def observe(self) -> Observation:
         """Positions, velocities and loads of one read, with its time and how old the measurement is: for a control loop.
 
-        A damaged answer is asked for again at once. Raises `NotServed` with the maker's firmware. A servo that does
+        A damaged answer is asked for again at once. Raises `NotServed` with the maker's firmware or map 2.1. A servo that does
         not answer keeps its last position here: `status()` tells.
         """
     @property
@@ -440,8 +440,8 @@ class Arm:
         """A stream of set-points, one each `period` seconds, 0.005 to 1: a context manager. An arm has one open stream at a time.
 
         If the program sends nothing for `watchdog` seconds, 0.01 to 2.55 or 0 for never, the arm holds; with `damping` it
-        sinks slowly. Needs this project's firmware, or raises `NotServed`. `approach`: seconds to go smoothly to the first
-        point, 0.1 to 60; without it a point further than 5 degrees raises `TooFar`. `table` and `guard`: see `pose`.
+        sinks slowly. Needs this project's firmware and map 2.2, or raises `NotServed`. `approach`: seconds to go smoothly to the
+        first point, 0.1 to 60; without it a point further than 5 degrees raises `TooFar`. `table` and `guard`: see `pose`.
         """
     def record(
         self, seconds: float | None = None, *, hz: int = 30, guided: bool = False
@@ -531,7 +531,8 @@ class SimulatedArms:
     def step(self, actions: ArrayLike | None, dt: float, out: _Numbers) -> _Numbers:
         """Sends each arm its action, the next set-point of seven angles of 0 to 180 degrees, lets `dt` pass, and reads its state.
 
-        `actions` is an array (n, 7); arrays of float32 and float64 without gaps are not copied. With `None` the arms go on.
+        `actions` is an array (n, 7); arrays of float32 and float64 without gaps are not copied, unless `out` has the other type.
+        With `None` the arms go on.
         `dt` is 0.005 to 1 second in whole milliseconds. Returns `out`, or a new array (n, 32), which is float32 if the actions are.
         A wrong action raises `ValueError` before any arm moves. Ctrl-C ends the call after the step.
         """
@@ -768,7 +769,7 @@ class JointStatus:
         """Is the joint driven, at rest, and within 3 degrees of its target?"""
     @property
     def state(self) -> str:
-        """What the joint does, in a word or two; empty if the motors are off."""
+        """What the joint does, in a word or two; empty if it has no problem and the motors are off."""
     @staticmethod
     def _of_registers(registers: bytes, joint: int) -> JointStatus: ...
 
@@ -1008,7 +1009,7 @@ class Simulation:
     @load_grams.setter
     def load_grams(self, value: int, /) -> None: ...
     def drop_load(self) -> None:
-        """Drops what is in the gripper: the thing between the claws, and the weight."""
+        """Drops all that the gripper holds: the thing between the claws, the weight, and an object of the scene."""
     @property
     def scene(self) -> str | None:
         """What stands on the table, as text: `"cube red 30 40 0 200; cylinder can 40 60 100 -80 200"`. docs/simulation.md describes it.

@@ -11,7 +11,7 @@ The part before the colon is what Gymnasium imports: since version 1.0 Gymnasium
 
 With `disturbed=True` each episode has a load, a delay of actions and maybe a fault: of the line, of a servo, of the supply, or
 a hand that pushes. An action turns the set-points of joints 1 to 5. `gymnasium.make_vec(name, num_envs=1000)` steps many arms at
-once. The arm touches nothing but walls in joint space, and there are no cameras.
+once. The arm touches nothing, and there are no cameras.
 
 Needs `pip install sevenbot[gym]`.
 """

@@ -159,7 +159,8 @@ impl SimulatedArms {
 
     /// Sends each arm its action, the next set-point of seven angles of 0 to 180 degrees, lets `dt` pass, and reads its state.
     ///
-    /// `actions` is an array (n, 7); arrays of float32 and float64 without gaps are not copied. With `None` the arms go on.
+    /// `actions` is an array (n, 7); arrays of float32 and float64 without gaps are not copied, unless `out` has the other type.
+    /// With `None` the arms go on.
     /// `dt` is 0.005 to 1 second in whole milliseconds. Returns `out`, or a new array (n, 32), which is float32 if the actions are.
     /// A wrong action raises `ValueError` before any arm moves. Ctrl-C ends the call after the step.
     #[pyo3(signature = (actions, dt = 0.02, out = None))]

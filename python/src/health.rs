@@ -141,7 +141,7 @@ impl JointStatus {
         self.health.is_at_target
     }
 
-    /// What the joint does, in a word or two; empty if the motors are off.
+    /// What the joint does, in a word or two; empty if it has no problem and the motors are off.
     #[getter]
     fn state(&self) -> String {
         self.health.word(self.is_driven)

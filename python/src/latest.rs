@@ -22,7 +22,7 @@ struct Slot {
     /// The counts of the sender.
     counts: LatestCounts,
     failed: Option<MoveError>,
-    /// The last angle that the program offered for each joint, in degrees.
+    /// The last angle that the program offered for each joint, or else its target at the start, in degrees.
     pose: [f64; 7],
 }
 
@@ -35,7 +35,7 @@ impl Slot {
 /// The answer to a program that offers an action.
 pub(crate) struct Told {
     pub(crate) counts: LatestCounts,
-    /// The last angle of each joint in the actions so far, in degrees.
+    /// The last angle of each joint in the actions so far, or else its target at the start, in degrees.
     pub(crate) pose: [f64; 7],
 }
 
@@ -86,7 +86,6 @@ impl LatestSlot {
         self.slot().action.take()
     }
 
-    /// The action that waits.
     pub(crate) fn waiting(&self) -> Option<FineTargets> {
         self.slot().action
     }

@@ -18,7 +18,7 @@ use sevenbot::stream::LatestStep;
 
 use crate::watch::{Inbox, PacedStream, Watch};
 
-/// The longest time between two checks of the arm and its watchdog.
+/// The longest time between two checks: does the arm follow, and does its watchdog need a frame?
 const LOOK_PERIOD: Duration = Duration::from_millis(20);
 
 impl PacedStream<'_> {

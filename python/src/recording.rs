@@ -27,7 +27,7 @@ pub(crate) struct Recording {
 }
 
 impl Recording {
-    /// From a text that this program has written.
+    /// From the text of a file, without times of arrival.
     pub(crate) fn of_text(py: Python<'_>, text: &str) -> PyResult<Self> {
         raised(py, Moments::parse(text)).map(|moments| Self { moments, arrivals: None })
     }

@@ -79,13 +79,11 @@ impl Simulation {
     }
 }
 
-/// A joint by its number.
 fn joint(py: Python<'_>, number: i64) -> PyResult<Joint> {
     let joint = u8::try_from(number).ok().and_then(Joint::new);
     joint.ok_or_else(|| InvalidValue::raise(py, &format!("joint {number}: use 1 to 7")))
 }
 
-/// A fault by its words.
 pub(crate) fn fault(py: Python<'_>, text: &str) -> PyResult<ArmFault> {
     text.parse().map_err(|why| InvalidValue::raise(py, &format!("{text}: {why}")))
 }
@@ -212,7 +210,7 @@ impl Simulation {
         self.with(py, |simulation| simulation.plant_mut().set_load(grams))
     }
 
-    /// Drops what is in the gripper: the thing between the claws, and the weight.
+    /// Drops all that the gripper holds: the thing between the claws, the weight, and an object of the scene.
     fn drop_load(&self, py: Python<'_>) -> PyResult<()> {
         self.with(py, |arm| drop(arm.act(arm_sim::Action::Drop)))
     }

@@ -20,7 +20,8 @@ use crate::stream_counts::StreamCounts;
 use crate::watch::{PacedStream, StreamOrder, Watch};
 use crate::worker::{Worker, lock};
 
-/// The longest time between two frames while a point is not due yet. It is too long for a watchdog of 10 ms.
+/// The longest time between two checks whether the watchdog needs a frame before the next point. It is too long for a watchdog of
+/// 20 ms or less.
 const SLICE: Duration = Duration::from_millis(20);
 
 /// A stream of set-points, a context manager: `with arm.stream(0.02) as stream: stream.send(...)`.

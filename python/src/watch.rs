@@ -82,7 +82,7 @@ impl<'a> PacedStream<'a> {
         self.stream.arm().elapsed()
     }
 
-    /// Puts the registers back, and closes the slot for actions, also if this fails.
+    /// Puts the registers back. Closes the slot for actions, even if the registers cannot be put back.
     pub(crate) fn close(self) -> Result<(), StreamError> {
         let closed = self.stream.close();
         self.slot.close();
@@ -123,7 +123,6 @@ pub(crate) struct CallState {
 }
 
 impl CallState {
-    /// The state of a new call.
     pub(crate) fn new(stops: &Arc<AtomicU64>) -> Self {
         let stops_before = stops.load(Ordering::Relaxed);
         Self { stops: Arc::clone(stops), stops_before, ..Self::default() }

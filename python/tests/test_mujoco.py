@@ -32,7 +32,7 @@ def example() -> ModuleType:
 
 
 def path(rest: NDArray[Any], time: float) -> NDArray[numpy.float64]:
-    """A movement of joints 1 to 6, each in its own rhythm, at up to 60 degrees per second."""
+    """A movement of joints 1 to 6 in four rhythms, at up to 60 degrees per second."""
     way = numpy.array([40, 15, 15, 30, 30, 40, 0])
     rhythm = numpy.array([1, 2, 2.5, 1.5, 2, 1, 0])
     angles: NDArray[numpy.float64] = rest + way * numpy.sin(rhythm * time)

@@ -1,4 +1,4 @@
-//! The health of an arm as a diagnosis of ROS, with the keys of `ros/sevenbot_ros`.
+//! The health of an arm as a diagnosis of ROS, with keys of `ros/sevenbot_ros`.
 
 use sevenbot::Health;
 use sevenbot::health::{JointHealth, Problem, sentences};
@@ -6,7 +6,7 @@ use sevenbot::register_text::motor_state_name;
 
 use crate::messages::{DiagnosticStatus, KeyValue};
 
-/// The status has this name in every recording and bag.
+/// The name of the status: the same as of a node `/sevenbot`.
 const NAME: &str = "/sevenbot: arm";
 const OK: u8 = 0;
 const WARN: u8 = 1;

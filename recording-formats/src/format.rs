@@ -14,9 +14,9 @@ use std::path::Path;
 pub enum Format {
     /// The text format of `sevenbot record`: [`sevenbot::recording`].
     Text,
-    /// Values with commas, in degrees.
+    /// Values separated by commas, with angles in degrees.
     Csv,
-    /// MCAP with messages of ROS 2, in radians.
+    /// MCAP with messages of ROS 2, with angles in radians.
     Mcap,
 }
 

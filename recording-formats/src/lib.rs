@@ -7,7 +7,7 @@
 //!                      an arm ──▶ McapWriter ────────▶        the same, while it moves
 //! ```
 //!
-//! An MCAP file has the topics of the node in `ros/sevenbot_ros`, with angles in radians. It is not compressed.
+//! The topics of an MCAP file are named as in `ros/sevenbot_ros`. Its angles are in radians, and it is not compressed.
 //!
 //! ```
 //! use recording_formats::{Format, read, write};

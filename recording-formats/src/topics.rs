@@ -1,6 +1,6 @@
-//! The topics of a recording: the topics of the node in `ros/sevenbot_ros`, and the pump.
+//! The topics of a recording, named as in `ros/sevenbot_ros`, and the pump.
 //!
-//! Stamps are times since 1970. The time of the first moment within the recording is in the metadata of the channel.
+//! Stamps are times since 1970. The time of the first moment within the recording is in the metadata of a channel.
 
 use std::collections::BTreeMap;
 use std::time::Duration;

@@ -186,7 +186,7 @@ def test_services(start: Start, client: Clients) -> None:
     assert calling.degrees() == pytest.approx(HOME, abs=3.0)
     parked, text = calling.call("park")
     assert parked, text
-    # Rear arm upright, forearm folded up; commands wait for `hold`.
+    # Rear arm upright, forearm folded up. Commands are refused until `hold`.
     calling.until(lambda: calling.degrees()[2] < -30.0, "the park pose")
     assert calling.call("hold")[0]
     home, future = calling.begin("home")

@@ -217,7 +217,7 @@ impl Command {
 }
 
 impl Command {
-    /// Does the command itself exchange frames with an arm? `serve`, `view` and `class` leave that to their server.
+    /// Does the command open an arm, so that `--log` has something to write? In `serve`, `view` and `class` a server opens it.
     const fn opens_arm(&self) -> bool {
         match self {
             Self::Ports(_) | Self::Plot(_) | Self::Sniff(_) | Self::Servo(_) | Self::Registers(_) => false,

@@ -72,8 +72,8 @@ impl Drop for OutputFile {
     }
 }
 
-/// Standard output for the content of a file, unchanged: the printer would remove escape sequences from it. The name of a
-/// `binary` format, which a terminal cannot show, is for the error.
+/// Standard output for the content of a file, unchanged: the printer would remove escape sequences from it. `binary` names a
+/// format that a terminal cannot show: then a terminal is an error.
 pub(crate) fn stdout_for(binary: Option<&str>) -> Result<Stdout, CommandError> {
     let stdout = io::stdout();
     match binary.filter(|_| stdout.is_terminal()) {

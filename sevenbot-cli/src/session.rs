@@ -17,7 +17,7 @@ use crate::printer::{Printer, note, warn};
 pub(crate) struct Session {
     /// The port from the command line; `None`: the only one that leads to an arm.
     pub(crate) port: Option<String>,
-    /// Baud rate, timeout and attempts.
+    /// Baud rate, timeout, attempts and register map.
     pub(crate) options: ArmOptions,
     pub(crate) printer: Printer,
     /// The file for all bytes to and from the arm.

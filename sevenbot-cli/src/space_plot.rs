@@ -75,7 +75,8 @@ pub(crate) fn drawing(title: &str, way: &[WayPoint]) -> String {
     svg::end(out)
 }
 
-/// The side of all panels in millimetres: the largest extent of the way in any direction, and a margin.
+/// The side of all panels in millimetres: the largest extent of the way and the origin in any direction, at least [`GRID_MM`],
+/// and a margin on both sides.
 fn span(way: &[WayPoint]) -> f64 {
     let extents = VIEWS.iter().flat_map(|view| bounds(view, way)).map(|[low, high]| high - low);
     extents.fold(GRID_MM, f64::max) + 2.0 * MARGIN_MM

@@ -52,7 +52,7 @@ pub(crate) fn note_rounding(begun: &JointMove) {
 }
 
 /// Tells the user which joints do not move at the default speed: their registers were set on purpose, or a command was killed
-/// before it could put them back. Not on the maker's firmware, which has other defaults.
+/// before it could put them back. Only on this project's firmware: the maker's has other defaults.
 pub(crate) fn note_other_pace(arm: &mut Arm, targets: &FineTargets) -> Result<(), CommandError> {
     if arm.identity().firmware() != Firmware::Ours {
         return Ok(());

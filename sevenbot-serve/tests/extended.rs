@@ -106,7 +106,7 @@ fn d24_a_program_that_switches_its_watchdog_off_delays_nobody() {
     assert!(!has_acted(&mut world, 1));
 }
 
-/// A program that sets the watchdog again and again, and is silent for as long as it can be.
+/// A program sets the longest watchdog, 2.55 s, again and again, and is silent until the watchdog has acted.
 #[test]
 fn d24_no_watchdog_keeps_the_others_from_the_arm() {
     let mut world = World::new(2);

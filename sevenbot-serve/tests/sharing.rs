@@ -299,7 +299,7 @@ fn an_arm_that_stops_answering_loses_replies_but_never_crosses_them() {
     let mut world = World::new(2);
     world.arm.halt_controller(world.now);
     (0..2).for_each(|program| world.send(program, &read(POSITIONS.0, POSITIONS.1)));
-    // The server waits this long for the reply to a read.
+    // The server waits 3 s for the reply to a read.
     world.run(3_100);
     world.arm.restart_controller(world.now);
     world.run(1_000);

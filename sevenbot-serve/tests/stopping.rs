@@ -66,7 +66,7 @@ enum Attack {
     LongWrites,
     Targets,
     Stops,
-    /// A program sets a watchdog of 10 ms, and is silent for 50 ms.
+    /// A program sets a watchdog of 10 ms, and is silent for 40 ms of each 50 ms.
     Watchdogs,
 }
 

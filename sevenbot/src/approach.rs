@@ -26,7 +26,7 @@ pub const NEAR_DEGREES: f64 = 5.0;
 const SLOW_DEGREES_PER_SECOND: f64 = 30.0;
 /// The peak speed of the blend in [`Approach::at`], divided by its mean speed.
 const PEAK: f64 = 1.5;
-/// Time between two moments of [`Approach::recording`]. It equals the longest step of a playback in whole degrees.
+/// Time between two moments of [`Approach::recording`]. It equals `playback::MAX_SEGMENT`.
 const MOMENT: Duration = Duration::from_millis(50);
 
 /// What to do if the first point is not where the arm stands.
@@ -210,8 +210,8 @@ fn check_near(standing: &Standing, first: &FineTargets) -> Result<(), StartTooFa
     if far.is_empty() { Ok(()) } else { Err(StartTooFar { joints: far, is_seam: false }) }
 }
 
-/// Where the way begins. A joint within 5 degrees of its target begins at the target, so that its set-point makes no step
-/// although a loaded servo droops. Any other joint begins where it is measured.
+/// Where the way begins. A joint that is measured further than 5 degrees from its target begins where it is measured. Any
+/// other joint begins at its target, so that its set-point makes no step although a loaded servo droops.
 fn starts(standing: &Standing) -> [f64; 7] {
     let mut from = standing.targets;
     for (target, measured) in from.iter_mut().zip(standing.measured) {

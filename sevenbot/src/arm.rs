@@ -302,7 +302,7 @@ impl Arm {
         Ok(read.answer.map(|answer| self.view.view(&answer, read.wanted)))
     }
 
-    /// The error for background questions without an answer. Takes the counts of what was received instead.
+    /// The error for background questions without an answer within `waited`. Resets the counts of what was received.
     pub(crate) fn no_background_answer(&mut self, span: Span, waited: Duration) -> Error {
         let received = self.link.take_received();
         Error::NoAnswer { span, attempts: 1, waited, received }

@@ -15,7 +15,7 @@ use crate::identity::Firmware;
 use crate::joints::frames_of;
 use host_link::{Snapshot, Span};
 
-/// The set-point period and the watchdog of a stream. A program that ends its stream switches both off.
+/// The set-point period and the watchdog of a stream. A program that ends its stream puts both back.
 const PERIOD_AND_WATCHDOG: Span = Span::between(&SET_POINT_PERIOD, &HOST_WATCHDOG);
 
 impl Arm {

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use crate::error::PortError;
 
-/// A line to an arm, such as a serial port. A line to a simulated arm has a clock of its own.
+/// A line to an arm, such as a serial port. A line to an arm in virtual time has a clock of its own.
 ///
 /// All waits of the library use this clock, so that an [`Arm`](crate::Arm) in virtual time waits in virtual time.
 pub trait HostLine: fmt::Debug + Send {

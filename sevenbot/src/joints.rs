@@ -101,7 +101,7 @@ impl Arm {
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct JointSnapshot {
-    /// From the motor state to the present positions.
+    /// Holds at least [`Self::REGISTERS`].
     registers: Snapshot,
     /// `None` from firmware without a status block.
     pub(crate) status: Option<StatusBlock>,

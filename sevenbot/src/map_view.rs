@@ -85,8 +85,8 @@ impl MapView {
         Snapshot { address: span.address(), values: span.addresses().map(value).collect() }
     }
 
-    /// The frames that write these values. One frame if one function code of the arm writes them all. Registers whose
-    /// addresses map 2.1 uses for something else are left out.
+    /// The frames that write these values: one for each run of neighbouring addresses of the arm with the same function code.
+    /// Registers that the arm must not get are left out: [`Self::skips`].
     pub(crate) fn writes(self, address: u8, values: &[u8]) -> Vec<WriteFrame> {
         if values.is_empty() {
             return vec![WriteFrame { map: self.map, address, values: Vec::new() }];
@@ -121,8 +121,7 @@ impl MapView {
         self.map == Map::V22 && of_map21.peek().is_some() && !of_map21.any(starts_others)
     }
 
-    /// The map for the registers of a write that both maps have: the map of the write's other registers, so that one frame holds
-    /// all.
+    /// The map for registers that both maps have. It is the map of the other registers in the write, so that one frame holds all.
     fn default_map(self, address: u8, count: usize) -> Map {
         let has = |test: &dyn Fn(u8) -> bool| (address..=u8::MAX).take(count).any(test);
         let is_only_map22 = |address| FEEDBACK_FREQUENCY.holds(address) || PRESENT_POSITION.holds(address);
@@ -137,7 +136,8 @@ impl MapView {
         self.map == Map::V21 || self.firmware == Firmware::Ours && is_only_map21(address)
     }
 
-    /// Is this register left out of writes? In map 2.1 the addresses of the present positions belong to the tip.
+    /// Is this register left out of writes? In map 2.1 the addresses of the present positions belong to the tip, and other
+    /// firmware than ours moves the arm at any write to a part of a position.
     fn skips(self, address: u8) -> bool {
         self.map == Map::V21 && (PRESENT_POSITION.holds(address) || self.starts_inverse(address))
     }

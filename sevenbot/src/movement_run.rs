@@ -217,7 +217,7 @@ impl MovementRun {
             Content::Steps(_) => return RunStep::Over,
         };
         if time >= self.duration() {
-            // A joint reaches a point at most two periods after its frame (D23).
+            // A joint reaches a point at most two periods and a control cycle after its frame (D23).
             let rest = if vacuum.is_some() { 2 * self.period + TAIL } else { self.period };
             self.end = Some(now + rest);
         }

@@ -8,7 +8,7 @@
 //! ```
 //!
 //! If the program dies, the watchdog of the arm acts: [`WatchdogAction`]. A clean end, an error and a panic put the registers
-//! back.
+//! back. After a lost connection, a player leaves them to the watchdog.
 
 use std::time::Duration;
 

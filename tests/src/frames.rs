@@ -1,4 +1,4 @@
-//! Frames, written from `docs/protocol.md`, section 2, without code of the product.
+//! Frames, written from `docs/protocol.md`, sections 2, 8 and 9, without code of the product.
 
 use crc::{CRC_16_MODBUS, Crc};
 

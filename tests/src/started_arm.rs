@@ -1,8 +1,9 @@
 //! An arm that a test starts for itself. It ends with the test.
 //!
 //! ```text
-//!   Simulator, Emulator:  port ──▶ one process
-//!   Adapter:              port ──▶ host-sim --servos ──▶ link ──▶ host-sim --servos-only
+//!   Simulator:  port ──▶ host-sim
+//!   Emulator:   port ──▶ xtask emulate, which starts the servos and the emulator
+//!   Adapter:    port ──▶ host-sim --servos ──▶ link ──▶ host-sim --servos-only
 //! ```
 
 use std::env;

@@ -15,7 +15,7 @@ use crate::process::RunningProgram;
 use crate::programs::TOOL_TIMEOUT;
 use crate::wait::wait_for;
 
-/// The size of the terminal: the least that the tool supports.
+/// The size of a usual terminal.
 const ROWS: NonZeroU16 = NonZeroU16::new(24).unwrap();
 const COLUMNS: NonZeroU16 = NonZeroU16::new(80).unwrap();
 

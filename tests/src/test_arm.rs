@@ -23,7 +23,7 @@ use crate::wait;
 
 /// The default baud rate.
 const BAUD: u32 = 115_200;
-/// The number of settings: device id, baud rate code, offsets.
+/// The number of settings that are restored: device id, baud rate code, offsets.
 const SETTINGS: u8 = 9;
 
 /// True if positions differ by at most 2 degrees: registers hold whole degrees, and servos have some play.
@@ -290,7 +290,8 @@ impl TestArm {
         output.expect("sevenbot runs")
     }
 
-    /// Brings a shared arm into the state after power-up, at rest in the standard pose, and saves its settings.
+    /// Writes the defaults of registers 28 to 53 to a shared arm, waits until the arm rests in the standard pose, and saves its
+    /// settings.
     fn reset_shared_arm(&mut self) {
         self.write(FEEDBACK_FREQUENCY, &[0]);
         self.drain();

@@ -3,8 +3,8 @@
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-/// The timeout of all waits. It is long, because the machine may be busy. For example, a browser that draws one picture a
-/// second advances its simulated arm by only 0.1 s per picture.
+/// The timeout of [`wait_for`], and of most reads from an arm. It is long, because the machine may be busy. For example, a
+/// browser that draws one picture a second advances its simulated arm by only 0.1 s per picture.
 pub const TIMEOUT: Duration = Duration::from_secs(180);
 const POLL_PERIOD: Duration = Duration::from_millis(10);
 

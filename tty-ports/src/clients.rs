@@ -8,7 +8,7 @@
 //! The queue of reports is bounded, and after an overflow the counts are wrong. Then the open files of all processes are
 //! searched instead, until no client has the port open and counting starts again.
 //!
-//! All ports share one inotify instance, because a user may have only 128 instances by default.
+//! All ports of a program share one inotify instance, because a user may have only 128 instances by default.
 
 use std::collections::HashMap;
 use std::io;

@@ -12,7 +12,7 @@ pub(crate) fn has_other_holder(terminal: &Path) -> bool {
     let is_number = |name: &OsStr| name.as_encoded_bytes().iter().all(u8::is_ascii_digit);
     let processes = processes.flatten().filter(|entry| is_number(&entry.file_name()));
     let folders = processes.map(|process| process.path().join("fd"));
-    // The files of other users' processes are not visible, but these users cannot open the port.
+    // The files of other users' processes are not visible. Of these users, only root can open the port.
     let open_files = folders.filter_map(|folder| fs::read_dir(folder).ok()).flatten().flatten();
     let targets = open_files.filter_map(|file| fs::read_link(file.path()).ok());
     targets.filter(|target| target == terminal).nth(1).is_some()

@@ -1,6 +1,6 @@
 //! Non-blocking terminals: pseudo-terminals that a program offers to others, and serial ports that it opens.
 //!
-//! Linux only, because inotify is used to count the clients of a pseudo-terminal.
+//! Linux only: counting clients needs inotify and `/proc`, and the lock of a link is an abstract socket.
 //!
 //! ```
 //! use tty_ports::pty::Pty;

@@ -70,7 +70,7 @@ pub struct Symlink {
 struct LinkLock {
     /// Another program, or another [`Symlink`] of this program, holds the lock.
     is_taken: bool,
-    /// `None` if the lock is taken, or if the system refuses to create such a socket.
+    /// `None` if the lock is taken or cannot be created.
     _socket: Option<UnixListener>,
 }
 

@@ -70,7 +70,7 @@ const BAD = ["no_arm", "stop_failed", "blocked", "problem"];
 const RETRY_MS = 1000;
 // After this many failed attempts, assume that the class has ended: an interrupted network is less likely.
 const MOST_REFUSED = 5;
-// The server sends the state of the class at least twice a second. Silence for this long counts as a lost connection.
+// The server sends the state of the class about twice a second or more often. Silence for this long counts as a lost connection.
 const SILENCE_MS = 3000;
 
 const $ = id => document.getElementById(id);
@@ -335,7 +335,7 @@ document.addEventListener("click", event => {
 });
 document.addEventListener("keydown", event => {
   if (event.key === " " && event.target.id !== "say") {
-    // The space bar stops everywhere. On a button it must not press the button, too.
+    // The space bar stops everywhere, except in the field for a message. On a button it must not press the button, too.
     event.preventDefault();
     if (!event.repeat) ACTIONS.stop();
   }

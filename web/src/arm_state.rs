@@ -20,7 +20,8 @@ const RESTING_VELOCITY: f32 = 1.0;
 /// An arm at one instant, joint 1 first.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ArmState {
-    /// The present positions in degrees. A silent joint keeps its last one; `None` for a joint not measured since power-up.
+    /// The present positions in degrees. A silent joint keeps its last one. A joint not measured since power-up has `None`, or 0 on
+    /// an arm without the extended block.
     pub measured: [Option<f32>; 7],
     /// The target positions in degrees.
     pub targets: [f32; 7],

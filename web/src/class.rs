@@ -21,7 +21,7 @@ pub struct Membership {
     wanted: String,
     key: Option<String>,
     is_welcome: bool,
-    /// The number of the teacher's last stop, and its outcome; `None` until the arm has confirmed it.
+    /// The teacher's last stop: its number, and its outcome once the arm has confirmed it.
     stop: Option<(u32, Option<StopOutcome>)>,
     /// The outcome of the stop still has to be sent.
     is_confirmation_due: bool,
@@ -79,7 +79,8 @@ impl Membership {
         !self.is_confirmation_due
     }
 
-    /// The message that confirms the teacher's last stop; `None` until the arm has stopped, and after it was sent once.
+    /// The message that confirms the teacher's last stop: once when the arm has stopped, and again each time that the same stop
+    /// arrives after that. `None` otherwise.
     pub fn confirmation(&mut self, progress: StopProgress) -> Option<String> {
         let (number, outcome) = self.stop.as_mut()?;
         if outcome.is_none() {
@@ -127,7 +128,7 @@ pub fn report(client: &Client, activity: Activity, goals: Option<Goals>, is_hidd
     FromPupil::Report(Report { points, doing, goals, is_hidden }).to_json()
 }
 
-/// What the arm does, in one word. If several facts apply, the most important one wins, as in the line below the page's title.
+/// What the arm does, in one word. If several facts apply, the most important one wins.
 fn doing(state: &ArmState, stop: StopProgress, activity: Activity) -> Doing {
     match (stop, activity) {
         (StopProgress::Failed, _) => Doing::StopFailed,

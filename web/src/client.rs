@@ -20,8 +20,8 @@ use sevenbot::{Snapshot, Span};
 use crate::arm_state::ArmState;
 use crate::stop::{Stop, StopProgress, hold_frames};
 
-/// Two attempts of 200 ms: a read without a reply is lost after 400 ms. This is about ten times as long as a reply takes at
-/// 115,200 baud and through a server.
+/// A read is given up 400 ms after its reply was due. A reply takes about a tenth of this time at 115,200 baud and through a
+/// server.
 const PATIENCE: Patience = Patience { attempts: 2, timeout: Duration::from_millis(200) };
 /// The arm counts as disconnected after this many consecutive rounds in which a reply was lost.
 const LOST_ROUNDS: u32 = 3;
@@ -137,8 +137,9 @@ impl Client {
         self.last_time
     }
 
-    /// Makes every joint hold where it is. The frames are sent before all other queued frames, and repeated until the arm
-    /// confirms them: see [`Client::stop_progress`]. `speeds` are the speeds to restore, if those in the registers are temporary.
+    /// Makes every joint hold where it is. The frames are sent before all other queued frames, and repeated until the stop is
+    /// confirmed or has failed: see [`Client::stop_progress`]. `speeds` are the speeds to restore, if those in the registers are
+    /// temporary.
     pub fn stop(&mut self, now: Instant, speeds: Option<[u8; 7]>) {
         self.stop.start(Some(&self.registers).filter(|_| self.rounds > 0), speeds);
         self.continue_stop(now);

@@ -24,7 +24,7 @@ use crate::confirmed::{Confirmed, NotTaken, write_all};
 use crate::stop::since_start;
 
 /// Time between two points of a played movement, in milliseconds. A browser calls the page every 17 ms, so a point is sent up to
-/// 17 ms late. This is within 8.5 ms of an even grid; D23 allows a quarter of the period, 12.5 ms.
+/// 17 ms late. So the points are within 8.5 ms of an even grid; D23 allows a quarter of the period, 12.5 ms.
 const PERIOD_MS: u16 = 50;
 const PERIOD: Duration = Duration::from_millis(50);
 /// The host-link watchdog: the arm holds if the page sends nothing for 500 ms while it plays. In units of 10 ms (D24).
@@ -56,7 +56,7 @@ pub enum PlayProgress {
 /// Why a movement, a park or a program ends early.
 #[derive(Clone, Debug, PartialEq)]
 pub enum PlayFailure {
-    /// The arm reports a problem, is not driven, or does not answer.
+    /// The arm reports a problem, is not driven or does not answer, or another client has ended its stream.
     Arm(MoveFault),
     /// The page did not run for this time, so that the arm may have stopped meanwhile.
     Paused(Duration),
@@ -212,8 +212,7 @@ impl Player {
         }
     }
 
-    /// Ends the movement early: closes the stream, and restores speeds and times. The arm stops at the last point that was sent,
-    /// at most 50 ms ahead.
+    /// Ends the movement early: closes the stream, and restores speeds and times. The arm stops at the last point that was sent.
     pub fn end(&self, now: Instant, client: &mut Client) {
         if !matches!(self.stage, Stage::Start | Stage::Settling(_)) {
             write_all(&self.closing_frames(), now, client);

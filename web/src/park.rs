@@ -5,8 +5,9 @@
 //!             └── motors off, a problem, a stop or a pause: ParkFailure ─────┘
 //! ```
 //!
-//! The path, its speed and the time to check are the same as for `sevenbot park`. A failure on the way stops the arm. After a
-//! failure in the last stage, `holds_again` decides whether the motors drive the arm again.
+//! The path, its speed and the time to check are the same as for `sevenbot park`. A failure on the way stops the arm, unless
+//! another client has stopped it already. After a failure in the last stage, `holds_again` decides whether the motors drive the
+//! arm again.
 
 use protocol_core::time::{Duration, Instant};
 use sevenbot::fine::FineTargets;
@@ -233,8 +234,8 @@ fn watch_parked(
     Ok(if now >= since + WATCH_TIME { ParkProgress::Parked } else { ParkProgress::Moving })
 }
 
-/// True if the motors have to drive the arm again after this failure, because it was let go already. False after a failure of
-/// the whole arm, such as a lost supply.
+/// True if an arm that was let go has to be driven again after this failure. False if the whole arm has failed, as after a lost
+/// supply, or if another client has stopped it.
 fn holds_again(failure: &ParkFailure) -> bool {
     match failure {
         ParkFailure::Sank | ParkFailure::Move(PlayFailure::Paused(_)) => true,

@@ -24,7 +24,7 @@ const MOST_STEPS: u32 = 15_000;
 const STEPS_TO_START: u32 = 100;
 /// The number of further steps until a new arm has reached any pose: 3 s.
 const STEPS_TO_POSE: u32 = 150;
-/// A new arm has reached its pose if joints 1 to 6 are at most this far from it, in degrees: servos have play. Joint 7 may hold
+/// A new arm has reached its pose if joints 1 to 6 are closer to it than this, in degrees: servos have play. Joint 7 may hold
 /// something.
 const NEAR: f32 = 3.0;
 

@@ -27,7 +27,7 @@ impl Recorder {
         Self { start: now, text: lines.head(), lines, watch }
     }
 
-    /// Adds the pose of these registers. Skips it if a joint is not measured, or if no time has passed since the last one.
+    /// Adds the pose of these registers. Skips it if a joint is not measured, or if less than 1 ms has passed since the last pose.
     ///
     /// # Errors
     /// A servo is silent, or the controller restarted: the registers do not hold the true positions, so the recording has to end.

@@ -20,7 +20,7 @@ pub enum StopProgress {
     Verifying,
     /// The arm has confirmed the targets that hold it.
     Holds,
-    /// The motors are off: there is nothing to stop.
+    /// The motors are off or damped: there is nothing to stop.
     NotDriven,
     /// The arm did not take the targets after several attempts. It may be moving.
     Failed,
@@ -81,12 +81,12 @@ impl Stop {
     }
 }
 
-/// The frames that make the joints hold without a confirmation, and then set these speeds. If the motors are off, the frames only
-/// set the speeds.
+/// The frames that make the joints hold without a confirmation, and then set these speeds. If the motors are off or damped, the
+/// frames only set the speeds.
 pub(crate) fn hold_frames(registers: &Snapshot, speeds: [u8; 7]) -> Frames {
     let frames = match Hold::at_once(Some(&HeldJoints::of(registers))).poll(Duration::ZERO) {
         HoldStep::Write(frames) => frames,
-        // The motors are off: no joint has to hold.
+        // The motors are off or damped: no joint has to hold.
         _ => Frames::new(),
     };
     frames.into_iter().chain([(SPEED.address, speeds.to_vec())]).collect()

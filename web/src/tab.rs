@@ -39,7 +39,6 @@ impl Tab {
         self.arm.now()
     }
 
-    /// The observation for an exercise.
     pub(crate) fn observation(&self) -> Observation {
         observation(self.now(), self.client.registers(), self.arm.simulation().plant().world())
     }

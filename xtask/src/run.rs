@@ -11,7 +11,7 @@ pub(crate) use emulator::process::{ChildProcess, TaskResult, wait_for};
 pub(crate) const BROWSER: &str = "wasm32-unknown-unknown";
 
 /// The packages whose programs and tests are built for the host. All commands select the same packages, because another
-/// selection may enable other features, and then their dependencies are built again. xtask is built before.
+/// selection may enable other features, and then their dependencies are built again. `cargo xtask` has built xtask before.
 pub(crate) const TESTED: &str = "--workspace --exclude footprint --exclude xtask";
 /// The packages that are linted and documented for the host.
 pub(crate) const CHECKED: &str = "--workspace --exclude footprint --exclude firmware-stm32";
@@ -83,7 +83,7 @@ pub(crate) fn experiment(name: &str) -> TaskResult {
     cargo(&format!("run --quiet -p emulator --example {name}"))
 }
 
-/// Builds the simulator, with one of its tests: cargo then selects features as for all tests.
+/// Builds the simulator through one of its tests, so that cargo selects the same features as for all tests.
 pub(crate) fn build_host_sim() -> TaskResult {
     cargo(&format!("test --quiet {TESTED} --test simulator --no-run"))
 }

@@ -1,4 +1,4 @@
-//! `cargo xtask size --by-file`: the sizes of the cores on the chip, by section and source file.
+//! `cargo xtask size --by-file`: the sizes of the cores and the image on the chip, by section and source file.
 
 use std::cmp::Reverse;
 use std::collections::BTreeMap;

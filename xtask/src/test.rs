@@ -1,6 +1,6 @@
 //! `cargo xtask test`: all checks and tests in one run.
 //!
-//! No step skips checks: the first step installs the tools, and a step without its tool fails.
+//! No step is skipped: the first step installs the tools, and a step without its tool fails.
 
 use clap::Args;
 

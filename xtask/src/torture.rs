@@ -5,7 +5,7 @@
 //!             free motion, with and without protection     a thousand motions
 //!             the parser on a disturbed line               a million frames for each disturbance
 //!   journal   the long forms of its tests                  all of them
-//!   fuzz      six targets                                  the other half of the time
+//!   fuzz      six targets                                  a twelfth of the time for each
 //! ```
 
 use clap::Args;

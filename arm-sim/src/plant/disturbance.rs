@@ -57,7 +57,8 @@ impl Plant {
         self.load_g + self.carried_g
     }
 
-    /// Interrupts the power of one servo at `now`. Torque and goal are lost, so a loaded joint falls unless a hand holds it.
+    /// Interrupts the power of one servo at `now`. Torque and goal are lost, so a loaded joint falls unless a hand or a stand
+    /// holds it.
     pub fn restart_servo(&mut self, now: Instant, joint: Joint) {
         self.advance(now);
         let ready_at = now + self.config.boot_time;

@@ -62,7 +62,7 @@ mod tests {
         // 120 g at 89 mm, 200 g at 259 mm, 100 g at 397 mm, 300 g at 437 mm.
         assert_eq!(base / 1_000_000, 87);
         assert_eq!(shoulder, 120 * 3_600 + 600 * 14_400);
-        // 200 g at 113 mm, 100 g at 250 mm, 300 g at 289 mm.
+        // 200 g at 113 mm, 100 g at 249 mm, 300 g at 289 mm.
         assert_eq!(elbow / 1_000_000, 33);
         assert_eq!(pitch, 100 * 2_500 + 300 * 8_100);
         assert_eq!([roll, wrist, claw], [0; 3], "they lie on the axis");

@@ -5,8 +5,9 @@
 //!   positions, velocities, loads ◀──┘
 //! ```
 //!
-//! Such a joint meets the obstacles of the other simulation. The weight, walls and hands of this simulation, and faults that
-//! block a servo, have no effect on it. Alarms, heat, the supply and all faults of the servo bus still act on it.
+//! Such a joint meets the obstacles of the other simulation. The weight, the walls and the hands that hold or push in this
+//! simulation, and faults that block a servo, have no effect on it. Alarms, heat, the supply and all faults of the servo bus
+//! still act on it.
 
 use protocol_core::registers::Joint;
 

@@ -8,7 +8,7 @@ use super::{Plant, inertia, weight};
 use crate::servo::Servo;
 use crate::servo::units::STEP;
 
-/// After a pause between calls that is longer than this, only the last part of the pause, of this length, is simulated.
+/// Of a longer pause between calls, only the last part of this length is simulated.
 const LONGEST_CATCH_UP: Duration = Duration::from_millis(100_000);
 
 impl Plant {

@@ -113,7 +113,7 @@ impl Supply {
         elapsed >= period.as_micros() && elapsed.checked_rem(period.as_micros()) < Some(DIP.as_micros())
     }
 
-    /// Counts the dips. Call it in each step.
+    /// Counts the dips. Call it in each step; steps up to [`Supply::steady_until`] can be left out.
     pub(super) fn step(&mut self, now: Instant) {
         if let Some(SupplyFault::Dips(period)) = self.fault {
             let is_in_dip = self.is_dip(now, period);
@@ -136,7 +136,7 @@ impl Supply {
         Instant::from_micros(next.as_micros().saturating_sub(STEP.as_micros()))
     }
 
-    /// Counts a valid frame on the bus, during a fault of the voltage.
+    /// Counts a valid frame on the bus, during [`SupplyFault::Volts`] or [`SupplyFault::Off`].
     pub(super) const fn count_frame(&mut self) {
         if matches!(self.fault, Some(SupplyFault::Volts(_) | SupplyFault::Off)) {
             self.count.count(true);

@@ -281,7 +281,7 @@ impl Motor {
     }
 
     /// The greatest distance of the joint from its set-point under its present external load, in thousandths of a degree.
-    /// `None`: the load exceeds the stall torque.
+    /// `None`: load and friction reach the stall torque.
     pub(crate) fn droop(&self) -> Option<i64> {
         let load = self.gear.highest_load(self.torques());
         (load < self.gear.0.stall_torque).then_some(FULL_DUTY_ERROR * load / self.gear.0.stall_torque.max(1))

@@ -25,8 +25,8 @@ impl Servo {
         self.motor.surroundings.inertia = inertia;
     }
 
-    /// The torque of the arm's weight. When it changes, the rest of the servo ends. A change of the inertia ends no rest, because
-    /// inertia has no effect on a joint at rest.
+    /// The torque of the arm's weight. When it changes, a servo at rest has to be simulated again. A change of the inertia has no
+    /// effect on a servo at rest.
     pub(crate) const fn weight(&self) -> i64 {
         self.motor.surroundings.weight
     }

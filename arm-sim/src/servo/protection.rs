@@ -2,7 +2,7 @@
 //!
 //! | alarm | begins | ends |
 //! | --- | --- | --- |
-//! | overload | the torque was above 80 % of the stall torque for a second | torque is switched off |
+//! | overload | the torque was above 80 % of the stall torque for a second | torque is switched off, or power is lost |
 //! | heat | the temperature is above register 13 | the temperature is at most register 13 |
 //! | voltage | the supply is outside registers 15 to 14 | the supply is within registers 15 to 14 |
 //!

@@ -7,15 +7,15 @@ use super::SimulatedArm;
 use crate::controller::ArmController;
 use crate::servo_bus::ServoBus;
 
-/// A deadline that stays in the past is checked again after this time. Wake-ups without bytes on the host line are at
-/// multiples of this time, so that many arms wake up together.
+/// A deadline that stays in the past is checked again after this time. With simulated servos, wake-ups without bytes on the
+/// host line are at multiples of this time, so that many arms wake up together.
 const TICK: Duration = Duration::from_millis(1);
-/// Without a client the next wake-up may be this much later, because no client sees the difference.
+/// Events that no client sees cause no wake-up before this time has passed. Without a client these are all events.
 const TICK_WITHOUT_CLIENT: Duration = Duration::from_millis(50);
 
 impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
-    /// When to call [`SimulatedArm::advance`] next, unless the host sends bytes. Without a client the call can be later:
-    /// the events keep their times.
+    /// When to call [`SimulatedArm::advance`] next, unless the host sends bytes. For simulated events that no client sees, the
+    /// call can be late: the events keep their times.
     #[must_use]
     pub fn deadline(&self, has_client: bool) -> Instant {
         let line = self.line_deadline().unwrap_or(Instant::FAR_FUTURE).max(self.now);

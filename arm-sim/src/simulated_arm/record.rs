@@ -10,8 +10,8 @@ use crate::session::{Entry, SessionEvent, SessionRecorder};
 use crate::tap::Watcher;
 
 impl<F, B, C> SimulatedArm<F, B, C> {
-    /// Passes everything that is done to the arm from outside, and the bytes that the host takes, to `recorder` from now
-    /// on. Changes by [`SimulatedArm::plant_mut`] are not recorded: use [`SimulatedArm::act`].
+    /// Passes the inputs of the arm, and the bytes that the host takes, to `recorder` from now on. Changes by
+    /// [`SimulatedArm::plant_mut`] are not recorded: use [`SimulatedArm::act`].
     pub fn set_recorder(&mut self, recorder: impl SessionRecorder + 'static) {
         self.recorder = Watcher::holding(Box::new(recorder));
     }

@@ -16,7 +16,7 @@
 //! - The claws carry an object once they touch it on both sides, however hard they press, until they open. The cup carries
 //!   an object that it touches with the pump on.
 //!
-//! All numbers are `f64`, and only correctly rounded operations are used: all machines get the same bits.
+//! All numbers are `f64`, computed with the operations of [`kinematics`]: all machines get the same bits.
 
 mod frame;
 mod hand;
@@ -88,7 +88,8 @@ pub(crate) struct ArmInWorld {
 pub(crate) struct Effect {
     /// The torques on joints 1 to 6 in mN m, towards greater angles.
     pub(crate) torques: [f64; 6],
-    /// The angle of joint 7 in degrees at which the claws touch the object between them. `None` without an object.
+    /// The angle of joint 7 in degrees at which the claws touch the object between them. `None` without an object, or if the claws
+    /// cannot have its width.
     pub(crate) claw_stop: Option<f64>,
     /// The weight of the carried object, in grams.
     pub(crate) load_g: u16,

@@ -89,7 +89,6 @@ impl Solid {
     pub(super) fn corners(self, frame: &Frame) -> [Point; 8] {
         let [x, y, z] = match self {
             Self::Box(half) => half,
-            // The corners of the square in the circle.
             Self::Cylinder { radius, half_height } => {
                 let side = radius * core::f64::consts::FRAC_1_SQRT_2;
                 [side, side, half_height]

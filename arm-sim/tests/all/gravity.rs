@@ -239,7 +239,7 @@ fn servos_keep_torque_and_goal_while_the_controller_restarts() {
     let now = Instant::ZERO + Duration::from_millis(2_000);
     simulation.restart_controller(now);
     assert_eq!(simulation.registers().get(FAULTS.address), fault::WATCHDOG_RESTART);
-    // The controller has sent no frame yet.
+    // The controller has sent no goal and no torque yet.
     assert!(Joint::ALL.into_iter().all(|joint| simulation.plant().has_torque(joint)));
     assert_eq!(start, Joint::ALL.map(|joint| simulation.plant().angle(joint)));
     simulation.advance(now + Duration::from_millis(2_000), true);

@@ -6,7 +6,7 @@ use arm_sim::{Action, Duration, Joint, Simulation};
 use kinematics::{Vector, ik6};
 use motion_core::calibration::MicroDegrees;
 
-/// Distance from the tip to the middle of the pads in mm, with claws that hold 30 mm.
+/// About the distance from the tip to the middle of the pads in mm, with claws that hold 30 mm.
 const PADS: f64 = 59.5;
 const BLOCKED_JOINTS: u8 = 195;
 

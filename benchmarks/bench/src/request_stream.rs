@@ -16,7 +16,6 @@ pub(crate) struct Case {
     damaged_per_mille: u32,
 }
 
-/// The measured cases.
 pub(crate) const CASES: &[Case] = &[
     Case { name: "read of 7", operation: read_joints, damaged_per_mille: 0 },
     Case { name: "write of 7", operation: write_joints, damaged_per_mille: 0 },

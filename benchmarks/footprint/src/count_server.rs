@@ -42,7 +42,7 @@ fn by_byte(meter: &Meter, server: &mut impl Server, name: &str, request: &[u8]) 
     meter.print(name, meter.count(|| request.chunks(1).for_each(|byte| feed(server, byte))));
 }
 
-/// The counted call. `cargo xtask bench` finds its stack use by this function's name.
+/// The counted call. `cargo xtask bench` and `cargo xtask size` find its stack use by this function's name.
 #[inline(never)]
 fn feed(server: &mut impl Server, piece: &[u8]) {
     server.feed(piece, &mut |reply| {

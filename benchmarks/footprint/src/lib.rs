@@ -1,9 +1,9 @@
 //! Shared parts of the measuring programs: inputs that the compiler cannot evaluate, and a panic handler that must not be
 //! linked.
 //!
-//! Each program calls one part of the cores as the firmware does. All inputs and outputs pass through [`opaque`], so the
-//! compiler can neither evaluate nor remove the calls. The programs have no other use: `xtask` inspects the linked images,
-//! and runs those that [count](meter) in the emulator.
+//! Each program calls a part of the cores, or a peer of `cargo xtask bench`. Inputs and outputs pass through [`opaque`], so the
+//! compiler can neither evaluate nor remove the calls. `xtask` inspects the linked images, and runs those that [count](meter)
+//! in the emulator.
 
 #![no_std]
 

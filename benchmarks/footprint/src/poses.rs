@@ -1,4 +1,4 @@
-//! Random poses, and the bits that kinematics make of them: the same on chip and host.
+//! Random poses, and a number mixed from the bits of their kinematics: the same on chip and host.
 //!
 //! `kinematics/tests/all/same_bits.rs` includes this file, so that the host checks the same number as the chip.
 

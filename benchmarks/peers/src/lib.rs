@@ -1,6 +1,5 @@
-//! The servers that `cargo xtask bench` and `cargo xtask count` compare. Each takes a stream of requests in pieces
-//! and returns replies. The same code is timed on the host, and its instructions are counted on the chip. It does not
-//! know how it is measured.
+//! The servers that `cargo xtask bench` compares. Each takes a stream of requests in pieces and returns replies. The same
+//! code is timed on the host, and its instructions are counted in the emulator. It does not know how it is measured.
 
 #![no_std]
 
@@ -23,8 +22,8 @@ pub trait Server {
     /// Takes the next piece of the stream and passes each reply to `reply`.
     fn feed(&mut self, piece: &[u8], reply: &mut impl FnMut(&[u8]));
 
-    /// Ends the stream as a silence longer than any timeout does: the server drops an unfinished frame, and answers requests that
-    /// are complete behind its header.
+    /// Ends the stream like a silence longer than any timeout: drops an unfinished frame, and answers complete requests behind its
+    /// header.
     fn end(&mut self, reply: &mut impl FnMut(&[u8]));
 
     /// The number of requests executed so far.

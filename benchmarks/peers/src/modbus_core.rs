@@ -32,7 +32,6 @@ const ENVELOPE: usize = 3;
 const WRITE_MULTIPLE_REGISTERS: u8 = 0x10;
 
 impl Default for ModbusCoreServer {
-    /// A server that has received nothing.
     fn default() -> Self {
         let registers =
             ModbusRegisters { words: initial_words(), data: [0; 250], frame: [0; rtu::MAX_FRAME_LEN] };

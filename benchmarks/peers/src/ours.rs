@@ -18,7 +18,6 @@ pub struct OurServer {
 }
 
 impl Default for OurServer {
-    /// A server that has received nothing.
     fn default() -> Self {
         Self {
             now: Instant::ZERO,

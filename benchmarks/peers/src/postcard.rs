@@ -53,7 +53,6 @@ struct RegisterServer {
 }
 
 impl Default for PostcardServer {
-    /// A server that has received nothing.
     fn default() -> Self {
         let (plain, stuffed) = ([0; ROOM], [0; ROOM]);
         let server = RegisterServer { registers: initial_values(), plain, stuffed, executed: 0 };

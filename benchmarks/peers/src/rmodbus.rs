@@ -19,7 +19,6 @@ pub struct RmodbusServer {
 }
 
 impl Default for RmodbusServer {
-    /// A server that has received nothing.
     fn default() -> Self {
         let mut registers = ModbusStorage::new();
         // Cannot fail: both hold the same number of registers.

@@ -1,5 +1,5 @@
-//! The register values that all servers start with, and the requests that are counted on the chip, as literal
-//! bytes.
+//! The register values that all servers start with, and the requests whose instructions are counted in the emulator, as
+//! literal bytes.
 //!
 //! A Modbus register holds two bytes. Modbus register `n` holds bytes `2n` (high) and `2n + 1` (low) of the register
 //! map, so all servers hold the same 256 bytes.

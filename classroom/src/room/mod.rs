@@ -26,7 +26,7 @@ pub const MOST_PUPILS: usize = 64;
 const MOST_TEACHERS: usize = 4;
 /// A tab has to join within this time, or its connection ends.
 const JOIN_TIME: Duration = Duration::from_millis(10_000);
-/// A pupil whose connection was lost is shown, and keeps the name, for this long.
+/// A pupil whose connection was lost is shown, and keeps the name, for this long, or until a new pupil needs the place.
 const LOST_KEPT: Duration = Duration::from_millis(120_000);
 
 /// The properties of a class that do not change.

@@ -29,8 +29,8 @@ pub const HOST_TRANSMIT: Pin = Pin::new(GpioPort::A, 9);
 pub const HOST_RECEIVE: Pin = Pin::new(GpioPort::A, 10);
 /// Servo bus, USART2: one wire, open drain. The bus needs an external pull-up to 3.3 V.
 pub const SERVO_BUS: Pin = Pin::new(GpioPort::A, 2);
-/// Direction of the buffer of the servo bus, and the level at which the board drives the bus; `None` if the bus has no
-/// buffer and the pin has another use. If the pin is unconnected, a bus without a buffer needs no change here.
+/// The direction pin of a buffered servo bus, and its level while the board drives the bus. On a bus without a buffer, leave the
+/// pin unconnected; `None` if it has another use.
 pub const SERVO_DIRECTION: Option<(Pin, Active)> = Some((Pin::new(GpioPort::A, 1), Active::High));
 /// Alternate function of the pins above: USART1 and USART2 (DS8626, table 9).
 pub const USART_FUNCTION: u8 = 7;
@@ -61,7 +61,7 @@ const _: () = assert!(
     "with this SERVO_BAUD the servos' answers come after SERVO_TIMEOUT"
 );
 
-/// Bytes of the longest answer of a servo: the registers from the torque switch to the measurements.
+/// Bytes of the longest answer of a servo: 27 registers from the torque switch on, and 6 bytes of framing.
 const LONGEST_ANSWER: u32 = 33;
 /// Timeout in the emulator, where bytes are late on a busy machine.
 pub const SERVO_TIMEOUT_EMULATED: Duration = Duration::from_millis(50);

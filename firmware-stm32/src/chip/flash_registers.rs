@@ -49,8 +49,8 @@ impl FlashRegisters for ChipFlashRegisters<'_> {
     }
 
     fn set_control(&mut self, bits: u32) {
-        // SAFETY: the only caller never sets the mass erase bit, and takes sector numbers from `sector_number`, which
-        // returns sectors of the journal. So no code and no vectors are erased.
+        // SAFETY: the only caller, `crate::flash::Flash`, never sets the mass erase bit. It takes sector numbers from
+        // `sector_number`, which returns sectors of the journal. So no code and no vectors are erased.
         self.registers.cr().write(|w| unsafe { w.bits(bits) });
     }
 

@@ -1,5 +1,4 @@
-//! The drivers of the chip: all accesses to registers, interrupts, and the handlers of crashes. `board.rs` is the table of
-//! the pins.
+//! The drivers of the chip: registers, interrupts, and the handlers of crashes. `board.rs` is the table of the pins.
 //!
 //! Firmware and self-test image link the same drivers. The drivers are tested in the emulator. Logic that has a file of its
 //! own outside this folder is tested on the host.

@@ -14,7 +14,7 @@ pub struct Outputs {
 }
 
 impl Outputs {
-    /// Makes their pins outputs, all off.
+    /// Makes the pins outputs, at the levels that switch the devices off.
     pub fn open() -> Self {
         Self {
             pump: board::PUMP.into_switch(board::VACUUM_ACTIVE),

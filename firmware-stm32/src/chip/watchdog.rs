@@ -14,7 +14,7 @@ const UPDATE_MICROS: u32 = 48_000;
 pub struct Watchdog(pac::IWDG);
 
 impl Watchdog {
-    /// Starts the watchdog. Only a reset stops it. TIM2 has to count by then.
+    /// Starts the watchdog. Only a reset stops it. TIM2 has to run already.
     pub fn start(registers: pac::IWDG, dbgmcu: &pac::DBGMCU) -> Self {
         // While a probe halts the core, torque and pump stay on. So the watchdog keeps counting and restarts the chip, except
         // in an image for a debugger. The bit outlives a reset, so it is written in both cases.

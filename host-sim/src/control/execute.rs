@@ -262,7 +262,6 @@ fn speed(factor: SpeedFactor) -> Result<TimeSpeed, ControlRefusal> {
     })
 }
 
-/// Adds the speed of virtual time.
 fn with_speed(mut value: Value, clock: &VirtualClock) -> Value {
     let speed = match clock.speed() {
         _ if clock.is_in_lockstep() => json!("lockstep"),

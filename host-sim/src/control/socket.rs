@@ -83,8 +83,8 @@ impl ControlSocket {
         self.clients.iter().filter_map(|client| client.waits_until).min()
     }
 
-    /// Accepts clients, executes the requests that have arrived by the virtual time `now`, and sends answers.
-    /// Returns whether there was a request.
+    /// Accepts clients, executes the requests that have arrived, and sends answers, including those that are due at the virtual
+    /// time `now`. Returns whether there was a request.
     ///
     /// # Errors
     /// The operating system fails: accept or epoll.

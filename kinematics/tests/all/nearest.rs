@@ -46,7 +46,7 @@ fn no_pose_of_the_arm_is_nearer() {
         let nearest = nearest_wrist(point).expect("a finite point");
         assert!(ik5(nearest).is_ok(), "{point:?}: {nearest:?}");
         let (ours, grid) = ((nearest - point).length(), distance_to_grid(&reach, point));
-        // Points of the grid are up to 5 mm apart.
+        // The grid has a pose within 5 mm of each position within reach.
         assert!(ours < grid + 1e-6 && grid < ours + 5.0, "{point:?}: {ours} mm, by the grid {grid} mm");
     }
 }

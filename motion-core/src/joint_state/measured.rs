@@ -9,7 +9,8 @@ pub(crate) enum Measured {
     FellSilent,
     /// The filter accepted the reading. The servo was not silent, and its error bits and its temperature are as before.
     Accepted,
-    /// The filter accepted the reading. The servo was silent, or its error bits or its temperature changed.
+    /// The filter accepted the reading. The servo was silent, its error bits or its temperature changed, the joint was let go, or
+    /// the set-point caught up.
     ServoChanged,
     /// The filter accepted the reading, and the joint engaged: its servo needs its goal, then a question about it.
     Engaged,

@@ -137,7 +137,7 @@ pub struct Bus {
 
 impl Bus {
     /// An idle bus at `baud` bits per second. A servo has to answer within `timeout` of the last byte sent. A frame
-    /// begins at least `guard_time` after the byte before it.
+    /// begins at least `guard_time` after the byte before it, unless noise lasts for 1 ms.
     #[must_use]
     pub const fn new(baud: u32, timeout: Duration, guard_time: Duration, codes: TorqueCodes) -> Self {
         Self {

@@ -29,7 +29,7 @@
 //! - **Generation and slot give the order**, not a running number. An interrupted record and its replacement would have
 //!   the same number, and the wrong one might become readable later.
 //! - **Only its mark states that a sector is blank.** After an interrupted erase a sector may read as blank. The mark
-//!   is programmed after a complete erase and a check of every word. It contains the generation that the sector is
+//!   is programmed after a complete erase and a check of every word. It is the CRC of the generation that the sector is
 //!   prepared for, so an older mark that survives an interrupted erase is not valid. One word is enough: the sector is
 //!   blank before the first bit of the mark is programmed. An interrupted mark lacks zeros, and an erase adds none.
 //!   Such a mark costs one more erase, and it cannot become valid if that erase is interrupted, too.
@@ -49,7 +49,8 @@
 //!
 //! No word is programmed with two different values. A save programs eight words. A start erases two sectors and
 //! programs 18 words at most: a record appended again, a mark, a record moved, a mark. A cell that does not take its
-//! bit costs a second attempt in the next slot. This module does not know registers: an image is 20 bytes.
+//! bit costs a second attempt in the next slot. A revocation after a wrong bit in the newest record costs one word more.
+//! This module does not know registers: an image is 20 bytes.
 
 mod sectors;
 mod slot;

@@ -21,11 +21,11 @@ pub(super) type Word = [u8; 4];
 pub(super) type Slot = [Word; 8];
 /// Bytes of a slot.
 pub(super) const LENGTH: u32 = 32;
-/// An erased slot. A slot also reads like this after a power cut at the very beginning of its first word.
+/// An erased slot. A slot may also read like this after a power cut at the very beginning of its first word.
 pub(super) const BLANK: Slot = [[0xFF; 4]; 8];
 
-/// The seal is programmed after the other seven words were verified, so a sealed slot has no half-programmed cells. It
-/// has as many ones as zeros, so wear or a power cut does not produce it by chance.
+/// The seal is programmed after the other seven words were verified, so in a sealed slot these words have no half-programmed
+/// cells. The seal has as many ones as zeros, so wear or a power cut does not produce it by chance.
 const SEAL: Word = [0x5E, 0xA1, 0xC3, 0x96];
 const CHECK: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
 
@@ -41,7 +41,7 @@ pub(super) const fn generation_after(generation: u32, steps: u32) -> u32 {
 /// The content of a valid slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Record {
-    /// How often the log has moved to the other sector; equal for all records of a sector.
+    /// Grows with each move of the log to the other sector; equal for all records of a sector.
     pub(super) generation: u32,
     pub(super) image: Image,
     /// The slot is sealed and needed no correction, so later starts will read the same.

@@ -144,8 +144,8 @@ impl RegisterFile {
     /// Checks a write of the host in map 2.2 without applying it.
     ///
     /// # Errors
-    /// [`Refused`] with the first register whose value is out of range, or which has two bytes of which the write covers only
-    /// one. Registers that the write cannot change are not checked.
+    /// [`Refused`] with the first register whose value is out of range, or that has two bytes while the write covers only one
+    /// of them. Registers that the write cannot change are not checked.
     pub fn check<'a>(&self, address: u8, values: &'a [u8]) -> Result<Accepted<'a>, Refused> {
         let (start, values) = self.unlocked(address, values);
         let accepted = Accepted { map: Map::V22, start, values };

@@ -37,7 +37,7 @@ impl Joint {
         self.0
     }
 
-    /// This joint's bit in the joint sets of the status block: bit n-1 is joint n.
+    /// This joint's bit in a set of joints: bit n-1 is joint n.
     #[must_use]
     pub const fn bit(self) -> u8 {
         1 << self.0

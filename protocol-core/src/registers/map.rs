@@ -1,6 +1,7 @@
 //! THE TABLE: every register of map 2.2 of the 7Bot V2 (docs/protocol.md).
 //!
-//! Outside tests, only this table and the table of map 2.1 hold register addresses as numbers.
+//! Outside tests, only this table and the table of map 2.1 hold the arm's register addresses as numbers. The registers of a
+//! server are in `host-link/src/sharing.rs`.
 
 use super::range::Range;
 use super::spec::{Register, eeprom, ram, rom, well_formed};
@@ -150,7 +151,7 @@ pub mod fault {
     pub const WATCHDOG_RESTART: u8 = 1 << 2;
     /// A drop of the supply voltage caused the last restart.
     pub const BROWN_OUT_RESTART: u8 = 1 << 3;
-    /// The crystal failed; the chip runs on its internal oscillator: 1 % off at 25 degrees Celsius, 4 % over temperature.
+    /// The crystal failed; the chip runs on its internal oscillator: 1 % off at 25 degrees Celsius, 4 % from -10 to 85.
     /// A serial line tolerates about 3.5 % between its two ends, so the host link works at room temperature at best.
     pub const CRYSTAL_FAILED: u8 = 1 << 4;
     /// Bytes from the host were lost, because the receive buffer was full.

@@ -75,7 +75,7 @@ impl Rule {
             (Access::ReadWrite, Range::UpTo(max)) => Self { mask: 0xFF, max },
             (Access::ReadWrite, Range::SignMagnitude(max)) => Self { mask: !SIGN, max },
             (Access::ReadWrite, Range::Biased(max)) => Self { mask: !SIGN, max: 2 * max },
-            // A `ValueRule` checks it.
+            // A `ValueRule` checks the value.
             (Access::ReadWrite, _) => Self { mask: 0xFF, max: 0xFF },
             _ => Self::CLOSED,
         }

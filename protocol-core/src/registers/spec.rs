@@ -93,7 +93,7 @@ impl Register {
         self
     }
 
-    /// Gives the row values of two bytes in this range. It comes before [`Register::each_joint`].
+    /// Gives the row values of two bytes in this range. Call this before [`Register::each_joint`], which counts the bytes.
     pub(crate) const fn word(mut self, range: Range) -> Self {
         self.count = range.width();
         self.range = range;
@@ -106,13 +106,11 @@ impl Register {
         self
     }
 
-    /// Makes the row read only.
     pub(crate) const fn read_only(mut self) -> Self {
         self.access = Access::ReadOnly;
         self
     }
 
-    /// Marks the row as reserved.
     pub(crate) const fn reserved(mut self) -> Self {
         self.access = Access::Reserved;
         self
@@ -142,7 +140,6 @@ impl Register {
         self
     }
 
-    /// Sets the default.
     pub(crate) const fn default(mut self, value: u16) -> Self {
         self.defaults = [value; JOINTS];
         self
@@ -154,7 +151,6 @@ impl Register {
         self
     }
 
-    /// Sets the unit.
     pub(crate) const fn unit(mut self, unit: Unit) -> Self {
         self.unit = unit;
         self

@@ -14,8 +14,8 @@
 //! * A frame at the head comes out as soon as its last byte is in the buffer.
 //! * If the head is not a frame, the search continues with the next byte.
 //! * Behind an incomplete head, complete frames come out after a short silence (the gap), while the head keeps
-//!   waiting. After the timeout ([`ABANDON_AFTER`]) the head is abandoned. So a false header in noise delays
-//!   frames by the gap at most, and a sender that pauses inside a frame loses nothing.
+//!   waiting. After the timeout ([`ABANDON_AFTER`]) the head is abandoned. So a false header in noise holds frames
+//!   back only until the next gap, and a frame survives a pause of its sender that is shorter than the timeout.
 //! * If the last bytes of a frame could begin a header, the next frame may begin with them. A frame may have lost its
 //!   own last byte and be completed by the first byte of the next frame; this rule keeps that next frame.
 //!

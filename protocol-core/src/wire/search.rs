@@ -8,7 +8,8 @@
 //!                 is incomplete  up to gap_end
 //! ```
 //!
-//! The deframer appends no bytes while the search has not passed a timeout, so such a timeout is at the end of the bytes.
+//! The deframer appends no bytes until the search has passed a timeout. So a timeout that is not passed is at the end of
+//! the bytes.
 //!
 //! This file handles positions only. The deframer owns the bytes, and appends to them between two calls of the search.
 

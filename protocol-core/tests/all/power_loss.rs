@@ -139,7 +139,8 @@ fn a_third_cut_at_every_step_before_the_others_are_mended() {
     cut_everything_again::<512>([1], 1, 3);
 }
 
-/// Runs power cycles with random numbers of saves. In seven of eight, the power is cut at a random operation.
+/// Runs power cycles with random numbers of saves. In seven of eight, the power is cut at a random operation, if the cycle has
+/// that many.
 fn cut_at_random<const SECTOR: usize>(cycles: u64, most_saves: usize) {
     let seed = std::env::var("JOURNAL_SEED").map_or(2_026, |seed| seed.parse().unwrap());
     println!("{SECTOR} B sectors, JOURNAL_SEED={seed}");
@@ -206,7 +207,7 @@ fn spare_full_of_remains() -> World<512> {
     world
 }
 
-/// Cuts the power in each start while it moves to the spare, until a start does not try to move.
+/// Cuts the power in each start that begins with a move to the spare, until a start does not.
 fn fill_spare_with_remains(world: &mut World<512>) {
     while world.operations(0).starts_with(&[Operation::Program; 8]) {
         assert_eq!(world.cycle(0, Some(torn_after(4))), End::Cut);

@@ -1,6 +1,5 @@
-//! Reads and writes against the table (D1, D2, D15 to D17, D22). The reads cover every range of addresses. So do the writes,
-//! in each lock and motor state, with all bytes of a write equal to one of some values. Other writes cover every value of
-//! each single register.
+//! Reads and writes against the table (D1, D2, D15 to D17, D22). The reads cover every range of addresses. So do the writes, in
+//! each lock and motor state; all bytes of such a write are equal. Other writes cover every value of each register.
 
 use protocol_core::registers::map::{baud_rate, fault, find};
 use protocol_core::registers::map21::find_readable;

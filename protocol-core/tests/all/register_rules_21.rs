@@ -1,5 +1,5 @@
 //! Writes in map 2.1 against the text of the protocol (M2, M3, M5, M6). The writes cover every range of addresses in each lock
-//! state, with all bytes of a write equal to one of some values. Other writes cover every value of each single register.
+//! state; all bytes of such a write are equal. Other writes cover every value of each register.
 
 use protocol_core::registers::map::LAST_REFUSAL;
 use protocol_core::registers::map21::find_readable;

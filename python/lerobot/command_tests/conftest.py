@@ -90,7 +90,7 @@ def lerobot(tmp_path: Path) -> LeRobot:
 
 
 def led(path: Path, speed: float) -> Path:
-    """A movement in which each joint has its own rhythm: a path that does not repeat itself.
+    """A movement of the joints in six rhythms: a path that does not repeat itself.
 
     The hand waits first, as a person does, until the follower has come.
     """

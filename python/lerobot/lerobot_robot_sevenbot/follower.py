@@ -110,7 +110,8 @@ class Sevenbot(Device, Robot):
         self._tell_change(wanted, angles)
         angles = self._caught_up(angles)
         self._send(connection, angles)
-        # The approach of a simulated arm takes no real time. Without this wait it would look like a pause before the next action.
+        # The approach of a simulated arm takes no real time. Without this wait, the approach would count as a pause before the next
+        # action.
         connection.follow_time()
         self._last, self._last_time = angles, time.monotonic()
         self._log.sent(angles, connection.simulation)
@@ -141,7 +142,7 @@ class Sevenbot(Device, Robot):
                 self._stream = self._begin_stream(connection, point)
             self._stream.send(point)
         except sevenbot.ArmProblem as problem:
-            # The point was sent. The firmware limits the push of a joint that stalls.
+            # The next action tries again. The firmware limits the push of a joint that stalls.
             self._warned.problem(problem)
 
     def _begin_stream(self, connection: Connection, point: joints.Angles) -> sevenbot.Stream:

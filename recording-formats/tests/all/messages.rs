@@ -11,8 +11,7 @@ use sevenbot::{Angle, FineAngle};
 
 use crate::START;
 
-/// A file with two moments of an arm in the straight pose with joint 1 at 180 degrees, its targets and motion, and one
-/// diagnosis.
+/// A file with two moments, their targets and motion, and one diagnosis. Joints 2 to 6 are at the zero of the model.
 fn file() -> Vec<u8> {
     let pose = [180, 90, 65, 90, 90, 90, 60].map(|degrees| FineAngle::from(Angle::from_register(degrees)));
     let telemetry = Telemetry {

@@ -1,6 +1,6 @@
 """Records topics of the arm into a bag in the format MCAP, without rosbag2: `python -m sevenbot_ros.bag FOLDER`.
 
-With rosbag2, use `ros2 bag record`. This needs `pip install rosbags`.
+With rosbag2, use `ros2 bag record`. This module needs `pip install rosbags`.
 """
 
 from __future__ import annotations

@@ -55,7 +55,7 @@ class SimulatedClock:
     def wait_until(self, end: float) -> None:
         left = end - self.now()
         if left > 0.0:
-            # The arm's clock counts microseconds, so a shorter sleep would not pass any time.
+            # The arm's clock counts microseconds: a sleep of less than one would not pass any time.
             try:
                 self._arm.sleep(max(left, STEP))
             except sevenbot.Interrupted:

@@ -3,8 +3,8 @@
     commands, goals ──▶ LeadSlot ──▶ Streamer ──▶ arm ──▶ Monitor ──▶ Events
     services ─────────▶ Interlock, which refuses commands and motions
 
-Knows no ROS. One thread sends the points of the stream and measures; services call the arm from their own threads, which the package
-`sevenbot` allows, after the stream has ended.
+Knows no ROS. One thread sends the points of the stream and measures. Services call the arm from their own threads, which the
+package `sevenbot` allows. All but `stop` and `vacuum` wait until the stream has ended.
 """
 
 from __future__ import annotations
@@ -86,7 +86,8 @@ class Driver:
 
     @contextmanager
     def motion(self) -> Iterator[sevenbot.Arm]:
-        """As `action`, for a service that moves the arm: every stop ends the motion. Raises `Halted` after a stop until `hold`."""
+        """As `action`, for a service that moves the arm: every stop ends the motion. Raises `Halted` if commands are
+        refused until `hold`."""
         with self.action() as arm, self.interlock.motion():
             yield arm
 

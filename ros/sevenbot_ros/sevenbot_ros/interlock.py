@@ -135,7 +135,8 @@ class Interlock:
 
     @contextmanager
     def motion(self) -> Iterator[None]:
-        """The context of a service that moves the arm. Every `stop` ends the motion. Raises `Halted` if commands are refused."""
+        """The context of a service that moves the arm. Every `stop` ends the motion. Raises `Halted` if commands are refused until
+        `hold`."""
         with self.lock:
             self.check_halted()
             self._motions += 1

@@ -17,8 +17,8 @@ from sevenbot_ros.joints import NAMES
 from sevenbot_ros.settings import Settings
 from sevenbot_ros.trajectory import Trajectory
 
-# From the sending of a point to a measurement of the joint there: two periods, a cycle of the controller (10 ms), and the age of
-# the measurement (a cycle). `LAG` is the two cycles, in seconds.
+# The longest time from the sending of a point to a measurement of the joint there: two periods, a cycle of the controller (10 ms),
+# and the age of the measurement (a cycle). `LAG` is the two cycles, in seconds.
 LAG_PERIODS = 2
 LAG = 0.02
 # The most commands that are kept while the stream opens, which takes about 0.1 s. Older ones are dropped.
@@ -33,7 +33,7 @@ class Lead(Protocol):
         """The angles of all joints at the last point; `None` before the beginning."""
 
     def begin(self, standing: Sequence[float]) -> None:
-        """Called when the stream begins. `standing` is where the joints stand."""
+        """Called when this begins to lead. `standing` is where the joints stand, or the last point of a stream that is open."""
 
     def next(self, steps: int, measurement: Measurement | None) -> list[float | None] | None:
         """The point this many periods after the last one, 0 for the first. `None` ends the stream."""
@@ -42,7 +42,7 @@ class Lead(Protocol):
         """What was refused since the last call."""
 
     def end(self, reason: str) -> None:
-        """Called when the stream ends for this reason. Has no effect if the lead has ended by itself."""
+        """Called when this leads no more, for this reason. Has no effect if the lead has ended by itself."""
 
     def gives_way_to(self, other: Lead) -> bool:
         """May this one end so that the other leads the arm?"""

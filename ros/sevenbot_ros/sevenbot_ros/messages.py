@@ -23,7 +23,7 @@ AXES = ((0, (0.0, 0.0, 1.0)), (2, (0.0, 1.0, 0.0)), (3, (-1.0, 0.0, 0.0)), (4, (
 
 
 def seconds(message: Time | Duration) -> float:
-    """A time or a duration of ROS in seconds. Unlike those of rclpy, it may be negative."""
+    """A time or a duration of ROS in seconds. It may be negative, which `rclpy.time.Time` refuses."""
     return float(message.sec + message.nanosec / 1e9)
 
 

@@ -42,7 +42,7 @@ class Streamer:
 
     @property
     def due(self) -> float:
-        """When `advance` has to be called again, on the clock of the arm. Never, if no stream is open."""
+        """When `advance` has to send the next point, on the clock of the arm. Infinite if no stream is open."""
         return math.inf if self._stream is None else self._next_point - MARGIN
 
     def advance(self, arm: sevenbot.Arm, clock: Clock, measurement: Measurement | None) -> None:
@@ -110,7 +110,7 @@ class Streamer:
             self._close_if_idle()
 
     def _close_if_idle(self) -> None:
-        # A stop ends the stream itself. Closing the stream here would wait until the stop has ended.
+        # A stop makes the arm hold without the end of the stream. Closing the stream here would wait until the stop has ended.
         if not self._interlock.is_stopping:
             self.close()
 

@@ -43,7 +43,7 @@ struct ArmInfo {
     #[serde(flatten)]
     identity: ArmIdentity,
     settings: ArmSettings,
-    /// None for the maker's firmware.
+    /// `None` unless the arm has this project's firmware.
     health: Option<HealthFigures>,
 }
 

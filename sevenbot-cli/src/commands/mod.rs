@@ -1,4 +1,4 @@
-//! The commands, one file each: arguments and execution.
+//! The commands, one module each: arguments and execution.
 
 pub(crate) mod backup;
 pub(crate) mod baud;

@@ -166,7 +166,7 @@ fn free_blocked_joints(arm: &mut Arm, health: &Health) -> Result<(), CommandErro
     Ok(())
 }
 
-/// Does the problem end only when the motor state or a target is written?
+/// Does the problem need step 3: a write of the motor state, or of targets?
 const fn needs_motors(kind: ProblemKind) -> bool {
     kind.ends_moves() || kind.is_alarm() || matches!(kind, ProblemKind::ServoBus)
 }

@@ -114,7 +114,7 @@ pub(crate) struct ServeArgs {
     read_only: bool,
 }
 
-/// The longest path of a Unix socket, in bytes, that every system accepts.
+/// Each system accepts a path of a Unix socket with up to this many bytes.
 const LONGEST_PATH: usize = 100;
 
 /// An address or a link at which programs can connect.
@@ -173,8 +173,7 @@ pub(super) fn run_server(
     ended.map_err(|error| CommandError::Arm(format!("the operating system failed: {error}")))
 }
 
-/// The Unix socket and the name of the server, for other programs of this user. `None` if this user has no private directory
-/// for the socket, or if its path would be too long.
+/// The Unix socket and the name of the server, for other programs of this user. `None` as from [`default_local`].
 fn local(args: &ServeArgs) -> Option<LocalServer> {
     let name = args.name.clone();
     match &args.socket {

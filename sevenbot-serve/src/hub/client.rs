@@ -18,9 +18,9 @@ use super::shares::Share;
 
 /// Requests of one client that may wait. The maker's arm has the same limit for its WebSocket.
 pub(crate) const MOST_WAITING: usize = 20;
-/// How long a request that moves or switches something may wait.
+/// How long a request that moves or switches something may wait, unless it switches the motors off.
 pub const LONGEST_WAIT: Duration = Duration::from_millis(200);
-/// Reports that wait for a client to take them. More are dropped.
+/// A report is dropped while this many events or more wait for the client.
 const MOST_REPORTS: usize = 4;
 /// Bytes that the waiting requests of a client and their replies may take on the line: 90 ms at 115 200 baud. One request is
 /// always allowed.
@@ -40,7 +40,7 @@ pub enum Event {
         /// The values, one byte per register.
         values: Vec<u8>,
     },
-    /// No reply comes to the client's oldest read: there is no arm, it did not answer, or the reply was damaged.
+    /// No reply comes to the client's oldest read: the read was dropped, the arm did not answer, or the reply was damaged.
     NoReply {
         /// The first register.
         address: u8,
@@ -75,7 +75,7 @@ pub(crate) struct Client {
     urgent_period: (Instant, u8),
     pub(crate) driving: Driving,
     readings: Readings,
-    /// Writes that were not carried out, wrapping.
+    /// Writes that were dropped, wrapping.
     pub(crate) dropped: u16,
     /// When it closed its connection; `None` while it is connected.
     pub(crate) left: Option<Instant>,
@@ -147,7 +147,7 @@ impl Client {
         self.waiting.front().map_or(0, |waiting| waiting.request.line_bytes())
     }
 
-    /// Queues a report, if one of this stream is due.
+    /// Queues a report if one of this stream is due, and few events wait. Returns whether it was queued.
     pub(crate) fn report(&mut self, now: Instant, stream: ReportKind, values: &[u8]) -> bool {
         let is_due = self.schedule.take_due(now, stream) && self.events.len() < MOST_REPORTS;
         if is_due {

@@ -1,4 +1,4 @@
-//! The targets that hold joints: the last write of a target to such a joint was a stop or a hold.
+//! The targets that stops and holds gave to joints, until a write moves or switches something.
 //!
 //! A joint that was stopped brakes past its target and returns to it. Meanwhile the server must not hold it at its measured
 //! position: the arm would come to rest at another position than the confirmed one.

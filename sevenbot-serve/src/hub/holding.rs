@@ -1,5 +1,5 @@
-//! How the hub holds the arm: the brake first, then the steps of [`ArmHold`], and at the end the set-point period and the speeds from
-//! before.
+//! How the hub holds the arm: the brake first, then the steps of [`ArmHold`]. At the end the hub restores the set-point period and
+//! the speeds.
 //!
 //! ```text
 //!   read the speeds, write 1, read ──▶ no reply: again, every 100 ms
@@ -21,7 +21,7 @@ use super::known_registers::KnownRegisters;
 use super::line::Owner;
 use super::watchdog::WatchdogAction;
 
-/// The slowest speed, 1.9 degrees/s. It acts on moves that go on ([D11](protocol_core::decisions#d11)), and bounds streams
+/// The slowest speed, 1.9 degrees/s. It acts on a move in progress ([D11](protocol_core::decisions#d11)), and bounds streams
 /// ([D23](protocol_core::decisions#d23)).
 const BRAKE: u8 = 1;
 
@@ -116,7 +116,7 @@ impl Hub {
         self.line.send_write(now, Map::V22, address, values);
     }
 
-    /// Takes a reply for the hold in progress. Cancels its other pending reads, whose replies show an older state.
+    /// Takes a reply for the hold in progress. Cancels its other pending reads: they were sent before the frames that follow.
     pub(super) fn continue_hold(&mut self, now: Instant, address: u8, values: &[u8]) {
         let Some(mut hold) = self.hold.take() else { return };
         self.line.cancel_reads(Owner::Hold);

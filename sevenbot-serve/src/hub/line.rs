@@ -89,7 +89,8 @@ impl Line {
         self.output.clear();
     }
 
-    /// Ends all pending reads: they get no reply. Keeps the bytes that wait for the port: they are a stop, or a part of a frame.
+    /// Ends all pending reads: they get no reply. Keeps the bytes that wait for the port: they may hold a stop, or the rest of a
+    /// frame.
     pub(crate) fn end_reads(&mut self) {
         self.link.reset();
     }

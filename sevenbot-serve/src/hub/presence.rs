@@ -12,7 +12,7 @@ use protocol_core::time::{Duration, Instant};
 
 /// Time between two questions.
 const PERIOD: Duration = Duration::from_millis(1_000);
-/// After this many unanswered questions, each with a timeout of 1 s, the arm counts as silent. One may be a lost reply.
+/// After this many unanswered questions, each with a timeout of 1 s, the arm counts as silent. The reply to one may be lost.
 const MISSES: u8 = 3;
 
 /// When the arm answered last, when it was asked last, and how many questions it missed.

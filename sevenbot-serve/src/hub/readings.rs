@@ -1,6 +1,6 @@
-//! The positions that a client has read lately. A write of targets that equal them holds the arm. Every program stops the arm
-//! in this way ([D24](protocol_core::decisions#d24) and `sevenbot::hold`), because the protocol has no request to stop. A joint
-//! that was read near its target may keep that target.
+//! The positions that a client has read lately. A write of targets that equal them holds the arm. Programs stop the arm in this
+//! way (`sevenbot::hold`), because the protocol has no request to stop. A joint that was read near its target may keep that
+//! target.
 
 use std::collections::VecDeque;
 

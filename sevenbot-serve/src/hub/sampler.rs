@@ -73,8 +73,8 @@ impl Sampler {
 }
 
 /// The highest frequency, in Hz, at which the reports of all streams together take at most half of the line
-/// ([D14](protocol_core::decisions#d14), [M2](protocol_core::decisions#m2)); at least 1. `bytes`: the length of one report of
-/// each stream.
+/// ([D14](protocol_core::decisions#d14), [M4](protocol_core::decisions#m4)); at least 1. `bytes`: one report of each active
+/// stream, added up.
 fn highest_frequency(baud: u32, bytes: usize) -> u32 {
     let bytes = u32::try_from(bytes).unwrap_or(u32::MAX);
     (baud / 20).checked_div(bytes).unwrap_or(0).max(1)

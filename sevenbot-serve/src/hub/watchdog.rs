@@ -100,7 +100,7 @@ impl ClientWatchdog {
         watched.map_or(Instant::FAR_FUTURE, |watched| watched.heard + watched.timeout())
     }
 
-    /// Replaces register 186 in a reply to a client, whose first register is `address`.
+    /// Replaces register 186 in a reply to a client, from register `address` on.
     pub(crate) fn overlay(&self, address: u8, values: &mut [u8]) {
         if let (Some(watched), Some(steps)) = (self.watched, byte_at(address, values, &HOST_WATCHDOG)) {
             *steps = watched.steps;

@@ -267,7 +267,7 @@ fn solution(before: &Event, after: &Event) -> Value {
     }
 }
 
-/// The answer to a write.
+/// The answer to a command whose request was queued or refused.
 fn done_or_refused(done: &str, admission: Admission) -> Value {
     match admission {
         Admission::Queued => message(done),

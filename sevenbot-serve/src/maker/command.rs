@@ -181,7 +181,7 @@ fn inverse_kinematics(block: Block, message: &Value) -> Result<MakerCommand, Str
     Ok(MakerCommand::InverseKinematics { address: block.address(), values })
 }
 
-/// A parameter that is a whole number.
+/// A parameter that is a whole number of at most six digits.
 fn whole(message: &Value, name: &str, missing: &str) -> Result<i64, String> {
     message
         .get(name)

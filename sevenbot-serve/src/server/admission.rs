@@ -2,8 +2,8 @@
 //!
 //! If all places for connections without a token are taken, the oldest of these connections loses its place to the next one. So
 //! connections that send nothing do not keep out a client that sends its token at once. After wrong tokens, the next tokens
-//! from the same address are checked one after the other, each after a delay. While there are more connections than places, no
-//! other one is accepted, because each takes file descriptors.
+//! from the same address are checked one after the other, each after a delay. The number of all connections is bounded, too,
+//! because each takes file descriptors.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::net::IpAddr;

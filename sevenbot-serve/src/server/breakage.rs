@@ -10,7 +10,6 @@ use tokio::io::Interest;
 #[cfg(unix)]
 use tokio::io::unix::AsyncFd;
 
-/// Tells when a connection breaks, even while nothing is read from it.
 #[cfg(unix)]
 #[derive(Debug)]
 pub(super) struct Breakage(AsyncFd<OwnedFd>);

@@ -76,7 +76,7 @@ impl ClassSite {
         accept(request, Protocol::Class(role))
     }
 
-    /// Only the page of the pupil who has the arm may connect.
+    /// Only the pupil who has the arm may connect. Pages of other servers are refused.
     fn frames<B>(&self, request: &Request<B>, host: &str) -> Result<Answer, Refusal> {
         check_origin(request, host, self.is_encrypted)?;
         let given = token_of(request.uri()).unwrap_or_default();

@@ -30,7 +30,7 @@ pub struct ServerConfig {
     pub class: Option<ClassConfig>,
     /// Who may connect over TCP and the maker's WebSocket.
     pub access: AccessPolicy,
-    /// TCP, the maker's WebSocket and the class are encrypted.
+    /// The certificate for TCP, the maker's WebSocket and the class; `None`: they are not encrypted.
     pub tls: Option<TlsFiles>,
     /// What clients may do.
     pub options: HubOptions,

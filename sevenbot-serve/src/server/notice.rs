@@ -12,7 +12,7 @@ use crate::hub::HoldOutcome;
 pub enum Notice {
     /// A 7Bot V2 answers on the port.
     ArmFound(PathBuf),
-    /// The port cannot be opened, or was lost. It is tried again all the time.
+    /// The port cannot be opened, or was lost. The server tries it again twice a second.
     ArmLost {
         /// The port.
         port: PathBuf,

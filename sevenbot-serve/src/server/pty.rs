@@ -15,7 +15,7 @@ use super::readiness::Readiness;
 use super::shared::Shared;
 use super::start_error::StartError;
 
-/// Bytes that are read at once: all that the kernel keeps.
+/// Bytes that are read at once: the size of the kernel's read buffer.
 const PIECE: usize = 4_096;
 
 /// A pseudo-terminal and its link.

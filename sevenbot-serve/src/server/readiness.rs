@@ -5,7 +5,6 @@ use std::os::fd::{AsFd, OwnedFd};
 
 use tokio::io::unix::{AsyncFd, AsyncFdReadyGuard};
 
-/// Tells when a file descriptor can be read or written.
 #[derive(Debug)]
 pub(super) struct Readiness(AsyncFd<OwnedFd>);
 

@@ -1,7 +1,7 @@
 //! The answer to an HTTP request. Reads no file and opens no port.
 //!
-//! The files are public: they are part of the program. The arm is behind the token, and `Host` and `Origin` have to be this
-//! server's own (see [`super::access`] for the reason).
+//! The files are public: they are part of the program. A request for a WebSocket needs the token, if there is one, and a `Host`
+//! and an `Origin` that the site accepts (see [`super::access`] for the reason).
 
 use std::fmt;
 use std::net::{IpAddr, SocketAddr};
@@ -111,7 +111,7 @@ impl PageSite {
         if is_frames { self.frames(request, host) } else { file(self.files, request, host, false) }
     }
 
-    /// Only this page may connect, and only with the token.
+    /// The token is needed, and pages of other servers are refused.
     fn frames<B>(&self, request: &Request<B>, host: &str) -> Result<Answer, Refusal> {
         check_origin(request, host, false)?;
         let given = token_of(request.uri()).unwrap_or_default();

@@ -41,7 +41,7 @@ use super::web_socket::{WebClient, serve_frames, serve_maker, serve_text};
 const TIMEOUT: Duration = Duration::from_secs(30);
 /// How long a client may take for the head of its request, and the handshake of TLS.
 const HEAD_TIMEOUT: Duration = Duration::from_secs(5);
-/// The longest request.
+/// The longest request, in bytes.
 const LONGEST_REQUEST: usize = 16 * 1_024;
 /// Bytes of a file that wait in the kernel for a slow client. Linux reserves twice as many.
 const FILE_BUFFER: usize = 256 * 1_024;

@@ -20,7 +20,7 @@ use super::seat::{End, Seat};
 use super::shared::Shared;
 use crate::maker::MakerClient;
 
-/// The longest message of a page.
+/// The longest message of a page, in bytes.
 const LONGEST_FRAMES: usize = 4_096;
 /// The longest message of the maker's programs, as in the maker's firmware.
 const LONGEST_COMMAND: usize = 2_048;

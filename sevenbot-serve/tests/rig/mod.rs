@@ -292,7 +292,7 @@ impl Page {
         self.client.is_overrun()
     }
 
-    /// Passes at most 20 messages to the client at once, as the server does.
+    /// Passes at most 20 messages to the client.
     fn send(&mut self, hub: &mut Hub, now: Instant) {
         for _ in 0..20 {
             let Some(message) = self.to_send.pop_front_if(|_| !self.client.is_overrun()) else { break };
@@ -349,7 +349,7 @@ impl Program {
 /// The registers of the server: the first one, and how many.
 pub const SHARING: (u8, u8) = (232, 8);
 
-/// The values of these registers, as a program reads them.
+/// The values of the registers of [`SHARING`], as a program reads them.
 pub fn sharing(world: &mut World, program: usize) -> Vec<u8> {
     world.take(program);
     world.send(program, &read(SHARING.0, SHARING.1));

@@ -44,7 +44,7 @@ pub struct StraightLine {
     pub start: TipPose,
     /// The length of the line, in millimetres.
     pub length_mm: f64,
-    /// The duration.
+    /// The duration of the line, without the turn of joint 4 before it.
     pub duration: Duration,
     /// The movement of the joints.
     pub recording: Recording,

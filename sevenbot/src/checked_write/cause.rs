@@ -99,8 +99,8 @@ impl ServerReason {
     }
 }
 
-/// The firmware's reason why a register is not written: the firmware lacks it, or a write would start a motion. `None` if it
-/// can be written.
+/// The firmware's reason why a register is not written: the firmware lacks it, or a write would start a motion. `None` if the
+/// firmware has no reason; then [`cause_from_access`] may have one.
 pub(super) fn cause_from_arm(view: MapView, address: u8) -> Option<MismatchCause> {
     match () {
         () if !view.serves(address) => Some(MismatchCause::NotServed),

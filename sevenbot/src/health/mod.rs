@@ -5,7 +5,7 @@
 //!   the same during a move ──▶ MoveWatch, MoveCheck ──▶ the reason to end it
 //! ```
 //!
-//! A value that the firmware does not report is `None`. It never counts as healthy.
+//! A value that the firmware does not report is `None`, not 0 or `false`.
 
 mod check;
 mod joint;

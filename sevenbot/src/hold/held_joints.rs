@@ -105,8 +105,8 @@ impl HeldJoints {
         let joints = &self.joints;
         let present = joints.present(joint);
         let is_unknown = present == 0 && joints.is_missing(joint);
-        // A joint that moves at position 0 cannot wait: it has just left 0 degrees, or start-up is not over. In
-        // start-up the arm does not drive a joint before it is measured, and then the next read replaces this target.
+        // A joint that moves at position 0 cannot wait: it has just left 0 degrees, or start-up is not over. During start-up the
+        // arm does not drive a joint that is not measured, and a later read replaces this target.
         let can_wait = self.may_be_unmeasured(joint, is_past_start_up) && !joints.is_moving(joint);
         (!is_unknown && !can_wait).then_some(present.into())
     }

@@ -29,7 +29,7 @@ use held_joints::SentTarget;
 
 /// Targets are written this many times before their loss is an error.
 const HOLD_ATTEMPTS: u32 = 5;
-/// A stop that is not confirmed after this time is written again.
+/// A stop that restores speeds at its end is written again if nothing confirms it for this time.
 const REPEAT_PERIOD: Duration = Duration::from_millis(100);
 /// The slowest speed, 1.9 degrees/s. It acts on moves that go on (D11), and bounds streams (D23).
 const BRAKE: [u8; 7] = [1; 7];
@@ -152,7 +152,7 @@ pub enum HoldStep {
     Read,
     /// Nothing is due before this time.
     Wait(Duration),
-    /// Every joint that is known holds: the stop is over.
+    /// Every joint with a known position holds: the stop is over.
     Holds(JointSnapshot),
     /// The motors do not drive the joints: there is nothing to stop.
     NotDriven(JointSnapshot),

@@ -62,7 +62,7 @@ impl SetPointStream<'_> {
         mut wait: impl FnMut(&mut Self, Duration) -> Result<(), E>,
     ) -> Result<(), E> {
         let deadline = self.arm().elapsed() + ARRIVAL_TIMEOUT;
-        // The set-points reach a point at most two periods after its frame.
+        // The set-points reach a point at most two periods and a control cycle after its frame (D23).
         let mut next = self.arm().elapsed() + 2 * self.period();
         loop {
             wait(self, next)?;

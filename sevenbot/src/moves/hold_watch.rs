@@ -22,8 +22,8 @@ const WATCH_TIME: Duration = Duration::from_millis(500);
 /// after a second (D27).
 const LONGEST_WATCH: Duration = Duration::from_millis(2_000);
 const POLL_PERIOD: Duration = Duration::from_millis(50);
-/// A target that the arm itself gives a joint is at most this far from the joint. At this distance the servo pushes with the
-/// default limit (D27).
+/// A target that the arm itself gives a joint is at most this far from the joint: a joint that pushes with the default limit is
+/// at most 4 degrees from its set-point (D27).
 const OWN_TARGET_DEGREES: u8 = 4;
 /// A joint that is further than this from its target, and further than at the start, does not hold. A loaded joint droops by
 /// up to 1.5 degrees, and one that was stopped at speed comes back to its target.

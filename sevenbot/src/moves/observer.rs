@@ -11,7 +11,7 @@ pub enum Stage {
     Moving,
     /// The joints have nearly arrived. In degrees.
     Settling,
-    /// A recording is played. In points.
+    /// A recording, or the way to a first point, is played. In points.
     Playing,
 }
 

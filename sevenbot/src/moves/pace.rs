@@ -65,7 +65,7 @@ impl PaceBefore {
         Ok(Self { registers, joints: joints_of(targets) })
     }
 
-    /// The speeds other than the default, and the durations that apply with them: what a move has that sets no pace. Each pair
+    /// The speeds other than the default, and the durations that apply with them. A move that sets no pace uses these. Each pair
     /// comes with its joints, as [`Joint::bit`](crate::Joint::bit)s.
     #[must_use]
     pub fn other_than_default(&self) -> Vec<(u8, Speed, MoveTime)> {

@@ -91,8 +91,8 @@ impl Arm {
         let before = PaceBefore::read(self, &all_joints)?;
         let moved = self.go_to_park_pose(pose, observer);
         if moved.is_err() {
-            // Without a hold, joints on their way would go on at the restored speeds. If the hold fails too, the error of the
-            // move is returned.
+            // Without a hold, joints on their way would go on. Then `put_back` restores nothing, or on the maker's firmware changes
+            // their speed. If the hold fails too, the error of the move is returned.
             let _ = self.hold_and_watch();
         }
         let restored = before.put_back(self);

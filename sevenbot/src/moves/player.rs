@@ -234,8 +234,8 @@ impl Player {
         self.end_stream(stream, done)
     }
 
-    /// Restores the speeds, and then the registers of the stream. If the connection is lost, leaves the stream to the watchdog of
-    /// the arm, so that the next program recognizes it: [`Arm::end_abandoned_stream`].
+    /// Ends a stream. After a success, restores the speeds, and then the registers of the stream. If the connection is lost, leaves
+    /// the stream to the watchdog of the arm, so that the next program recognizes it: [`Arm::end_abandoned_stream`].
     fn end_stream(
         &self,
         mut stream: SetPointStream<'_>,

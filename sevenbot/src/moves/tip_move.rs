@@ -45,7 +45,7 @@ impl TipMove {
 /// Why a way of the joints is not checked or not allowed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum GuardedMoveError {
-    /// The guard does not allow it.
+    /// The guard does not allow the way.
     #[error(transparent)]
     Guarded(#[from] PathBreach),
     /// An exchange failed.

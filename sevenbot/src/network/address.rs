@@ -49,13 +49,13 @@ impl Address {
         }
     }
 
-    /// Can other computers use this address, too?
+    /// Is this the host and port of a server, over TCP or TLS?
     #[must_use]
     pub const fn is_of_network(&self) -> bool {
         matches!(self, Self::Tcp(_) | Self::Tls(_))
     }
 
-    /// Does a server at this address get a token?
+    /// Can a server at this address get a token? A server at a Unix socket gets none.
     ///
     /// ```
     /// use sevenbot::network::Address;

@@ -94,7 +94,7 @@ pub enum LineError {
     },
 }
 
-// A speed is never NaN: it is a quotient of finite numbers.
+// A speed is never NaN: it is a quotient, and its dividend is more than one degree.
 impl Eq for LineError {}
 
 /// Parses a line of a file of this version.

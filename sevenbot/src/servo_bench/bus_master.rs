@@ -192,7 +192,7 @@ impl BusMaster {
         Ok(self.late.iter().filter(|&&late| late == id).count())
     }
 
-    /// The ids of late answers since the last call.
+    /// Takes the ids of late answers, oldest first.
     pub(crate) fn take_late(&mut self) -> Vec<u8> {
         std::mem::take(&mut self.late)
     }

@@ -19,7 +19,7 @@ const ARRIVED_COUNTS: u16 = 4;
 const TORQUE_ON: [u8; 1] = [1];
 /// Code 0 is damping in Feetech's older table, and free in the current one. In both the motor does not drive.
 const TORQUE_OFF: [u8; 1] = [0];
-/// Registers from the present position to the moving flag.
+/// The number of registers from the present position to the moving flag.
 const MEASURED: u8 = register::MOVING - register::PRESENT_POSITION + 1;
 /// This many consecutive readings above the load limit end the move. A single one may come from the start of the motion.
 const OVERLOAD_READINGS: u32 = 5;

@@ -8,11 +8,11 @@ use protocol_core::registers::Joint;
 use super::bus_master::BusMaster;
 use super::error::ServoError;
 
-/// Registers of the EEPROM, up to the LED conditions.
+/// The number of registers of the EEPROM, up to the LED conditions.
 const SETTINGS: u8 = register::LED_CONDITIONS + 1;
-/// Registers from the torque switch to the lock.
+/// The number of registers from the torque switch to the lock.
 const ORDERS: u8 = register::LOCK - register::TORQUE_SWITCH + 1;
-/// Registers from the present position to the moving flag.
+/// The number of registers from the present position to the moving flag.
 const MEASURED: u8 = register::MOVING - register::PRESENT_POSITION + 1;
 
 /// Versions, settings, commands and measurements of one servo.

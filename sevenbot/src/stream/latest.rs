@@ -139,7 +139,7 @@ impl LatestPoints {
     }
 
     /// Has the program offered nothing for the time of the watchdog? Then the sender sends nothing. Also true before the first
-    /// action.
+    /// action. `false` while an action waits for its point.
     #[must_use]
     pub fn is_silent(&self, now: Duration) -> bool {
         let watchdog = self.options.watchdog_time();

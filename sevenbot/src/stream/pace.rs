@@ -57,7 +57,7 @@ impl StreamPace {
         Self { start, period, next: 0, last_taken: None, counts: PaceCounts::default() }
     }
 
-    /// When the first point was due, or since [`Self::restart`] the first one after the pause.
+    /// When the first point was due; after [`Self::restart`], the first point after the pause.
     #[must_use]
     pub const fn start(&self) -> Duration {
         self.start

@@ -4,8 +4,8 @@
 //! This is a test program of its own, because it starts 24 arms at a time, and because what a command notices of a short
 //! fault depends on how busy the machine is.
 //!
-//! The snapshot holds what each command prints under each fault. A command succeeds only where the arm did what was asked,
-//! or where the command had only to print something. docs/reliability.md has the exit statuses.
+//! The snapshot holds the exit status and the first message of each command under each fault. A command succeeds only where the
+//! arm did what was asked, or where the command had only to print something. docs/reliability.md has the exit statuses.
 //!
 //! `CELL="stop / silent" cargo test -p system-tests --test faults -- --nocapture` shows all that these cells say.
 

@@ -109,7 +109,6 @@ pub fn run(options: &EmulateArgs) -> TaskResult {
     }
 }
 
-/// True if the emulator is installed.
 fn has_qemu() -> bool {
     Command::new(QEMU).arg("--version").stdout(Stdio::null()).status().is_ok_and(|status| status.success())
 }

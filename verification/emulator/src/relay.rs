@@ -15,9 +15,9 @@ use crate::process::TaskResult;
 
 /// The largest number of bytes in one read. The port is not read while earlier bytes from it still wait for the emulator.
 const CAPACITY: usize = 4_096;
-/// The most bytes that wait for a host that reads late. A wire never makes the chip wait. QEMU does, if its socket is full: the
-/// whole machine stands still and its clock goes on, so that the firmware takes the time for a pause inside a frame, and drops
-/// the frame (D4).
+/// The socket is not read while this many bytes wait for a host that reads late. A wire never makes the chip wait. QEMU does, if
+/// its socket is full: the machine stands still, and its clock goes on. The firmware takes this time for a pause inside a frame,
+/// and drops the frame (D4).
 const WAITING_FOR_HOST: usize = 1 << 20;
 /// The longest sleep while the firmware's log is printed, because the log has to be polled.
 const POLL_PERIOD: Timespec = Timespec { tv_sec: 0, tv_nsec: 50_000_000 };

@@ -12,7 +12,7 @@ use std::ops::Range;
 
 use linked_image::Effect;
 
-/// TIM2_CNT (RM0090, section 18.4.21).
+/// TIM2_CNT (RM0090, section 18.4).
 const TIME: u64 = 0x4000_0024;
 /// GPIOA_BSRR (RM0090, section 8.4.7).
 const PORT_A: u64 = 0x4002_0018;

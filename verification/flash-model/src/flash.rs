@@ -40,7 +40,7 @@ struct Bits {
 pub struct Flash<const SECTOR: usize, const WORD: usize = 4> {
     /// The present contents.
     cells: Vec<u8>,
-    /// The value that was requested for each word since the last erase of its sector; all ones without a request.
+    /// For each word, the value that a program operation requested, or its value at the start. All ones after an erase.
     requested: Vec<u8>,
     /// Bits that may read differently after the next power-up.
     marginal: Vec<Bits>,
@@ -207,7 +207,6 @@ impl<const SECTOR: usize, const WORD: usize> Flash<SECTOR, WORD> {
         list.iter().filter(|bits| bits.address == address).fold(0, |mask, bits| mask | bits.mask)
     }
 
-    /// Programs the word at `address`.
     pub(crate) fn program(&mut self, address: usize, new: &[u8]) -> Result<(), Error> {
         self.check_power()?;
         if self.half_erased >> (address / SECTOR) & 1 == 1 {
@@ -239,7 +238,6 @@ impl<const SECTOR: usize, const WORD: usize> Flash<SECTOR, WORD> {
         Ok(())
     }
 
-    /// Erases a sector.
     pub(crate) fn erase_sector(&mut self, sector: usize) -> Result<(), Error> {
         self.check_power()?;
         if self.erase_forbidden {

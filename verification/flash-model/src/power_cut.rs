@@ -41,8 +41,8 @@ pub enum ProgramTear {
     FaintOne,
     /// Two bits are marginal, the others are unchanged.
     FaintTwo,
-    /// Two bits that should stay ones are marginal. No NOR flash is known to do this, but the contract of `NorFlash`
-    /// allows it. Not in [`ProgramTear::ALL`].
+    /// Two bits that are not to be cleared are marginal, the others are unchanged. No NOR flash is known to do this, but the
+    /// contract of `NorFlash` allows it. Not in [`ProgramTear::ALL`].
     Disturbed,
 }
 

@@ -41,7 +41,8 @@ struct StackFunction<'a> {
 pub struct CallGraph<'a>(BTreeMap<u64, StackFunction<'a>>);
 
 impl<'a> CallGraph<'a> {
-    /// Reads the functions of a program. Refuses a function whose own pushes have no known bound.
+    /// Reads the functions of a program. Refuses a function whose stack has no known bound, or that continues where no function is
+    /// known.
     pub fn of(program: &'a Program<'_>) -> ReadResult<Self> {
         let mut graph = BTreeMap::new();
         let (guards, panic) = GUARDS;

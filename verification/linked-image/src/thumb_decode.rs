@@ -1,8 +1,7 @@
 //! The effect of a Thumb instruction on the flow of control, the stack pointer and the interrupt mask.
 //!
-//! `yaxpeax-arm` decodes the A and R profiles. So three things are added here from the ARMv7-M Architecture
-//! Reference Manual (DDI 0403): the special registers of `MSR` (B5.2.3), the floating-point instructions (A7.5), and the
-//! instructions that an M-profile core does not have.
+//! `yaxpeax-arm` decodes the A and R profiles. So this file adds three things from the ARMv7-M Architecture Reference Manual
+//! (DDI 0403): the special registers of `MSR` (B5.2.3), floating-point instructions (A7.5), and what an M-profile core lacks.
 
 use yaxpeax_arch::{Decoder, U8Reader};
 use yaxpeax_arm::armv7::{ConditionCode, InstDecoder, Instruction, Opcode, Operand, Reg};

@@ -24,7 +24,7 @@ pub struct FreeMotionTrial {
     pub motions: usize,
     /// The number of bytes to the servos that were compared.
     pub bytes: usize,
-    /// The seeds of motions in which the bytes differ, or in which a joint was blocked or let go with protection.
+    /// The seeds of motions in which the bytes or their times differ, or in which a joint was blocked or let go with protection.
     pub different: Vec<u64>,
 }
 

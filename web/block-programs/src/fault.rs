@@ -68,7 +68,7 @@ pub enum ProgramFault {
     NotInFunction,
     /// The result of a calculation is not finite, for example after a division by zero.
     NoNumber,
-    /// More than [`MOST_CALLS`](crate::MOST_CALLS) calls of functions are open: the recursion has no end.
+    /// A call would open more than [`MOST_CALLS`](crate::MOST_CALLS) calls of functions: the recursion probably has no end.
     TooManyCalls,
     /// A number is out of its range.
     OutOfRange {

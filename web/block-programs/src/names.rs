@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 
-/// Reserved names: the keywords of Python, and the names that the written program uses itself.
+/// Reserved names: the keywords of Python, the names that the written program uses itself, and `__name__`.
 const TAKEN: [&str; 42] = [
     "False", "None", "True", "and", "as", "assert", "async", "await", "break", "class", "continue", "def",
     "del", "elif", "else", "except", "finally", "for", "from", "global", "if", "import", "in", "is",

@@ -16,7 +16,7 @@ const START: &str = "arm_start";
 /// The kinds of the blocks that define a function: without a result, and with one.
 const FUNCTIONS: [&str; 2] = ["procedures_defnoreturn", GIVES_VALUE];
 const GIVES_VALUE: &str = "procedures_defreturn";
-/// The deepest nesting of blocks. The parser is recursive: each level needs a few hundred bytes of stack.
+/// The deepest nesting of blocks. It bounds the stack of the recursive parser.
 const DEEPEST: usize = 60;
 
 const AXES: [(&str, Axis); 3] = [("X", Axis::X), ("Y", Axis::Y), ("Z", Axis::Z)];

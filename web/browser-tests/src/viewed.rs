@@ -86,10 +86,10 @@ impl Viewed {
     }
 
     /// Begins a movement of joint 1 with this action, ends it by `sevenbot stop`, and waits until the page says so. On a busy
-    /// machine the page may pause for a second, or miss replies, which ends a movement, too: then begins the movement again.
+    /// machine the page may pause for a second, or miss replies. This ends a movement, too, and the test begins the movement again.
     ///
     /// # Panics
-    /// The movement ends for another reason, or is late each time.
+    /// The movement ends for another reason, or the page is late each time.
     pub fn stop_by_another_program(&self, page: &mut Page, action: &str) {
         for _ in 0..10 {
             page.click(&format!("[data-action={action}]"));

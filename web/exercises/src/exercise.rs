@@ -45,7 +45,7 @@ pub struct Exercise {
 /// The reason why a text is no valid exercise.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ExerciseError {
-    /// The line of the file, from 1; 0 for the file as a whole.
+    /// The line of the file, from 1; 0 if it is not known.
     pub line: usize,
     /// The reason, in English.
     pub reason: String,

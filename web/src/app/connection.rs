@@ -85,7 +85,8 @@ impl App {
         SharingState::of(self.client.registers()).is_some_and(|sharing| sharing.is_read_only)
     }
 
-    /// As [`Self::only_watches`], but also shows a notice. Called before the page moves or stops the arm.
+    /// As [`Self::only_watches`], but also shows a notice. A write or a stop by the user calls this. The buttons that begin a park,
+    /// a movement or a program are disabled instead.
     pub(super) fn refuses_to_drive(&self) -> bool {
         let only_watches = self.only_watches();
         if only_watches {

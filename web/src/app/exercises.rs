@@ -42,7 +42,6 @@ impl App {
         self.show_exercise();
     }
 
-    /// Handles the choice of another exercise.
     pub(super) fn choose_exercise(&mut self) {
         self.exercises.choose(self.dom.choice("exercise-choice").parse().unwrap_or(0));
         self.show_exercise();

@@ -13,7 +13,8 @@ pub struct Axis {
 
 impl Axis {
     /// An axis with zero in the middle, which contains all finite values and at least `-least` to `least`. Its step is round: 1,
-    /// 2 or 5 times a power of ten. Its ends are multiples of the step, with at most `most_steps` steps between them.
+    /// 2 or 5 times a power of ten. Its ends are multiples of the step. At most `most_steps` steps are between them, unless
+    /// rounding adds one at each end.
     #[must_use]
     pub fn around_zero(values: impl Iterator<Item = f32>, least: f32, most_steps: f32) -> Self {
         let largest = values.filter(|value| value.is_finite()).map(f32::abs).fold(least, f32::max);
@@ -38,7 +39,7 @@ impl Axis {
     }
 }
 
-/// The smallest number of the form 1, 2 or 5 times a power of ten that is at least `least`.
+/// The smallest number of the form 1, 2 or 5 times a power of ten that is at least `least`, less 0.1 % for rounding errors.
 fn round_step(least: f32) -> f32 {
     let power = 10.0_f32.powf(least.max(1e-6).log10().floor());
     let factor = [1.0, 2.0, 5.0].into_iter().find(|factor| factor * power >= least * 0.999);

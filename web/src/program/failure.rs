@@ -18,7 +18,7 @@ pub enum ProgramFailure {
     Refused {
         /// The name of the text that gives the reason in the language of the page.
         text: &'static str,
-        /// The reason in English, with what is possible instead.
+        /// The reason in English, and what is possible instead, if that is known.
         details: String,
     },
     /// The firmware of the arm does not provide a value that the program reads.

@@ -97,7 +97,7 @@ impl JointMove {
         }
     }
 
-    /// Returns `Ok(true)`, or fails if these registers show a new alarm, which no later check would see.
+    /// Returns `Ok(true)`, or fails if these registers show a new alarm: this move is not checked again.
     fn arrived(&mut self, now: Duration, registers: &Snapshot) -> Result<bool, ProgramFailure> {
         self.watch.end();
         self.watch.registers(now, registers)?;

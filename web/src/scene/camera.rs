@@ -132,7 +132,8 @@ impl Camera {
         perspective(FIELD_OF_VIEW, aspect) * turn * Mat4::from_translation(-self.position())
     }
 
-    /// Projects a point of the arm's frame, in mm, to CSS pixels from the top left. `None` if the point is behind the camera.
+    /// Projects a point of the arm's frame, in mm, to CSS pixels from the top left. `None` if the point is behind the camera, or
+    /// less than 20 mm in front of it.
     #[must_use]
     pub fn project(&self, point: Vec3) -> Option<Vec2> {
         let clip = self.view_projection() * point.extend(1.0);

@@ -1,5 +1,5 @@
 //! The lines of the scene: the grid on the table with its labels in mm, the plumb line below the tip, and the dashed line
-//! to a position out of reach.
+//! to a wanted position to which the arm does not go.
 
 use glam::{Vec2, Vec3};
 use kinematics::geometry::BASE_HEIGHT;
@@ -11,7 +11,7 @@ use super::view::View;
 
 /// The distance between lines of the grid, in mm.
 const STEP: f32 = 50.0;
-/// The number of steps from the middle of the grid to its edge.
+/// The number of steps from the middle of the grid to its outermost line.
 const STEPS: i16 = 9;
 /// The height of a character of a label, in mm.
 const LABEL: f32 = 13.0;

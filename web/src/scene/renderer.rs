@@ -23,7 +23,8 @@ use super::view::View;
 const CORNER: usize = 8;
 /// The direction to the lamp that casts the shadow.
 const LAMP: Vec3 = Vec3::new(0.25, -0.2, 1.0);
-/// The diameters of the markers of the tip and of a position out of reach, in CSS pixels. A hovered tip has the larger one.
+/// The diameters of the markers of the tip, and of a wanted position to which the arm does not go, in CSS pixels. A hovered tip has
+/// the larger one.
 const TIP_SIZE: f32 = 13.0;
 const WISH_SIZE: f32 = 18.0;
 /// The radius of the table in mm, and the number of corners of its edge.

@@ -51,7 +51,7 @@ pub struct Palette {
     pub ghost: Rgb,
     /// The marker of the tip.
     pub tip: Rgb,
-    /// A position out of reach.
+    /// A wanted position of the tip to which the arm does not go.
     pub unreachable: Rgb,
     /// Mixed into the colour of the part under the pointer.
     pub hover: Rgb,

@@ -29,7 +29,7 @@ pub struct View {
     pub targets: Option<Angles>,
     /// The colours of joints 1 to 7: see [`Palette::joint_ok`](super::theme::Palette::joint_ok) and its neighbours.
     pub colours: [Rgb; 7],
-    /// A wanted position of the tip, in mm, that the arm cannot reach.
+    /// A wanted position of the tip, in mm, to which the arm does not go: out of reach, or refused by the guard of the workspace.
     pub unreachable: Option<Vec3>,
     /// The walls, the things on the table, and the thing that the arm carries.
     pub things: Vec<Thing>,

@@ -11,7 +11,7 @@ const TRANSMIT: u64 = 1 << 1;
 const RECEIVE: u64 = 1 << 17;
 
 /// Checks that each byte to the servos is sent while the board drives the bus, and that the board listens before it drives
-/// again. The log may end within a frame.
+/// again. The log may begin and end within a frame: bytes before the first change of direction are not checked.
 pub(super) fn check(events: &[TraceEvent]) -> TaskResult {
     let (mut direction, mut sent, mut released) = (None, 0, 0);
     for event in events {

@@ -28,7 +28,8 @@ const TRIES: usize = 400;
 const SAMPLES: usize = 24;
 /// The time of a log of the moving arm: about forty control cycles.
 const WATCH_TIME: Duration = Duration::from_secs(4);
-/// The largest number of logs. A busy machine may show few control cycles in one log.
+/// The largest number of logs of the moving arm, and of the idle arm after its first five. A busy machine may show few control
+/// cycles in one log.
 const MAX_WATCHES: usize = 20;
 /// The number of control cycles that a log of the moving arm must show.
 const MIN_CYCLES: usize = 20;

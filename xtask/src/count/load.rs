@@ -22,7 +22,7 @@ use emulator::{frame, trace};
 
 /// The time between two frames of targets, in milliseconds; also the set-point period.
 const FRAME_MILLIS: u16 = 5;
-/// The frequency of the reports, their content, and the bytes of such a report: registers 142 to 183 and 7 more.
+/// The frequency of the reports, their content, and their length in bytes: 42 registers (142 to 183), and 7 bytes of the frame.
 const REPORT_HZ: u8 = 50;
 const CONTENT: u8 = 2;
 const REPORT_BYTES: usize = 49;

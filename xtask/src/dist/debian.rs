@@ -49,7 +49,7 @@ pub(super) fn write(release: &Release, platform: Platform, files: &[PackedFile])
     for (name, text) in [("control", control), ("md5sums", md5sums(&folder)?)] {
         put(&folder, &PackedFile::text(format!("DEBIAN/{name}"), text))?;
     }
-    // Only a package for users has to be small. The programs of the tests are large, because they contain debug information.
+    // Only a package for users has to be small. The programs of the tests contain debug information, so xz would take long.
     let compressor = if release.commit.is_some() { "-Zxz" } else { "-Zgzip" };
     let mut dpkg = Command::new("dpkg-deb");
     dpkg.args(["--root-owner-group", "--build", compressor])

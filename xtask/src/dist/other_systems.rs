@@ -1,4 +1,4 @@
-//! Lints the code for Windows and macOS, on a computer that can neither link nor run it.
+//! Lints the code for Windows and macOS. This needs neither these systems nor their linkers.
 
 use std::process::Command;
 

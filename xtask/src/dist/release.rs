@@ -15,7 +15,7 @@ pub(super) struct Release {
     pub(super) version: String,
     /// The commit, with `-dirty` if files differ from it; `None`: the programs were built without it.
     pub(super) commit: Option<String>,
-    /// The time of the commit in seconds since 1970. All files in archives have it.
+    /// The time of the commit in seconds since 1970. It is the time of all packed files, except in a `.zip`.
     pub(super) epoch: u64,
     /// Where the release is put.
     pub(super) folder: PathBuf,

@@ -1,4 +1,4 @@
-//! The tools that make a release, each at the version that was tried. All come from PyPI, crates.io, rustup or Debian.
+//! The tools from PyPI and crates.io that make a release, each at the version that was tried.
 
 use std::env;
 use std::ffi::OsString;

@@ -37,7 +37,7 @@ pub(crate) fn check() -> TaskResult {
     Err(format!("files depend on each other in a cycle:\n{}", faults.join("\n")).into())
 }
 
-/// A line about a cycle: the folder of the crate, and the files from the folder `src`.
+/// A line about a cycle: the folder of the crate, and the files, relative to the folder of `root_file`.
 fn line(folder: &Path, root_file: &Path, cycle: &BTreeSet<PathBuf>) -> String {
     let source = root_file.parent().unwrap_or(root_file);
     let names = cycle.iter().map(|file| file.strip_prefix(source).unwrap_or(file));

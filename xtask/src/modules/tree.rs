@@ -20,7 +20,7 @@ pub(crate) struct Tree(BTreeMap<Module, (PathBuf, SourceFile)>);
 pub(crate) type Uses = BTreeMap<PathBuf, BTreeSet<PathBuf>>;
 
 impl Tree {
-    /// Reads a crate from its root, `lib.rs` or `main.rs`.
+    /// Reads a crate from the file of its root, such as `lib.rs`.
     pub(crate) fn read(root: &FilePath) -> TaskResult<Self> {
         let mut tree = Self(BTreeMap::new());
         let folder = root.parent().unwrap_or(root).to_owned();

@@ -1,8 +1,7 @@
 //! `cargo xtask bench --simulation`: how many seconds of simulated arms pass in a second.
 //!
 //! All arms of a thread step together by 10 ms. *Idle* arms hold their pose. *Moving* arms follow a new target each second
-//! with all joints. *Polled* arms move too, and each is asked for its positions at 100 Hz: the next step begins when the
-//! reply has arrived.
+//! with all joints. *Polled* arms move too, and in each step a host reads the positions of each and waits for the reply.
 
 use std::error::Error;
 use std::fs;

@@ -1,5 +1,5 @@
-//! The parts of protocol-core that the controller does not call: the host's side of the protocol and lookups in the
-//! register table. Host tools and simulator use them.
+//! Parts of protocol-core, called directly: the reduction of the chip id, the host's side of the protocol, lookups in the
+//! register table, and the register file with any input.
 
 #![no_std]
 #![no_main]

@@ -65,7 +65,7 @@ fn d27_a_joint_at_a_wall_gives_way_is_blocked_and_stays() {
                 rig.run_ms(1);
                 swing = swing.max((rig.plant.angle(joint) - before).abs());
             }
-            // A payload pulls joint 3 in the same direction as its spring.
+            // The wall also carries the payload of joint 3, so the joint swings farther when the wall is gone.
             let most = if payload == 0 { 4_000 } else { 5_500 };
             let is_held = lasting <= 750 && swing <= most && target_now < target;
             if !is_held || blocked != bit(number) || moving != 0 || rig.get(ALARMS) != 0 {

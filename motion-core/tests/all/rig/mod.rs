@@ -90,7 +90,7 @@ impl Rig {
     }
 
     /// As [`Self::started`], without torque and on a stand: each joint is exactly in the standard pose. With torque, the level
-    /// forearm droops by 0.7 degrees.
+    /// forearm droops by 0.6 degrees.
     pub fn on_a_stand() -> Self {
         let mut rig = Self::new();
         rig.plant.support(true);

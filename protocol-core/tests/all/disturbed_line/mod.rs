@@ -177,8 +177,8 @@ impl Line {
         received.into_iter().for_each(|said| self.came_out(&said));
     }
 
-    /// Counts a frame that came out, and the frames of the burst that it skips as lost. A disturbance may let its victim
-    /// through, which is not among the expected frames and does not count.
+    /// Counts a frame that came out, and the frames of the burst that it skips as lost. A victim that a disturbance lets
+    /// through is not among the expected frames, and does not count.
     fn came_out(&mut self, said: &Received) {
         let Received::Frame(bytes) = said else { return };
         let Some(skipped) = self.waiting[self.done..].iter().position(|expected| expected == bytes) else {

@@ -1,6 +1,6 @@
 //! The thread that owns the arm: takes samples, executes commands, and reconnects after the arm was lost.
 //!
-//! It is a thread so that a silent port blocks neither keys nor drawing. It ends when the command channel closes.
+//! It is a thread so that a silent port blocks neither keys nor drawing. It ends when the screen ends.
 
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender};
 use std::time::{Duration, Instant};
@@ -28,7 +28,7 @@ pub(crate) struct ArmThread {
     pub(crate) port: Option<String>,
     /// The port used last.
     pub(crate) last_port: String,
-    /// Baud rate, timeout and attempts.
+    /// Baud rate, timeout, attempts and register map. The thread makes one attempt only.
     pub(crate) options: ArmOptions,
     /// Time between two samples.
     pub(crate) period: Duration,
@@ -59,8 +59,8 @@ impl From<Error> for WatchEnd {
 }
 
 impl ArmThread {
-    /// Runs until the command channel closes. After Ctrl-C it makes the arm hold and returns the result. `None`: there was no
-    /// Ctrl-C, or there is no arm.
+    /// Runs until the screen ends. After Ctrl-C makes the arm hold, and returns the result. `None`: there was no Ctrl-C, or there
+    /// is no arm.
     pub(crate) fn run(mut self) -> Option<Result<JointSnapshot, CommandError>> {
         while self.look().is_ok() {}
         let arm = self.arm.take();

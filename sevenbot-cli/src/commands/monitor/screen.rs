@@ -29,7 +29,7 @@ pub(crate) fn run(
     plot: PlotKind,
     guard: Option<Guard>,
 ) -> Result<(), CommandError> {
-    // Fails if there is no port at all. The thread retries a port that does not answer.
+    // Without --port this fails unless exactly one arm is found. The thread retries a port that does not answer.
     let port = session.port_name()?;
     let start = Instant::now();
     let mut view = MonitorView::new(&port, plot);

@@ -12,7 +12,7 @@ use sevenbot::{Angle, Arm, Error, FineAngle, Health, Snapshot, Span};
 const REGISTERS: Span = Span::between(&FINE_TARGET, &LOAD);
 /// Bits of a question and its answer on the line: 7 bytes for each frame and one for each value, at ten bits a byte.
 const BITS: u32 = 10 * (7 + 7 + REGISTERS.count() as u32);
-/// Reads use the line for at most 1 / `SHARE_OF_LINE` of the time. The rest is for reports.
+/// Reads of targets, velocities and loads use the line for at most 1 / `SHARE_OF_LINE` of the time.
 const SHARE_OF_LINE: u32 = 2;
 /// The time between two reads of the health, which has more registers.
 const HEALTH_PERIOD: Duration = Duration::from_secs(1);

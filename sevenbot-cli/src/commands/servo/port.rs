@@ -1,4 +1,4 @@
-//! The adapter's port, arguments of all subcommands, and the error of a failed exchange.
+//! The adapter's port, arguments that subcommands share, and the error of a failed exchange.
 
 use clap::{Args, builder::RangedI64ValueParser, value_parser};
 use sevenbot::servo_bench::{BAUD_RATES, BusMaster, BusOptions, MAX_ID, ServoError};

@@ -1,5 +1,5 @@
-//! The hub holds the arm by itself: for a client whose watchdog acts ([D24](protocol_core::decisions#d24)), or that sent the
-//! command to stop.
+//! The hub holds the arm by itself when the watchdog of a client acts ([D24](protocol_core::decisions#d24)), for a command to
+//! stop, and for a stop that comes too late.
 //!
 //! ```text
 //!   read which joints are silent or move ──▶ none: the arm holds
@@ -25,7 +25,7 @@ use super::held_targets::HeldTargets;
 
 /// The hold has failed after this many replies that do not confirm it.
 const MOST_ROUNDS: u8 = 10;
-/// A read without a reply is repeated after this time. The brake is written again before it.
+/// A read without a reply is repeated after this time. Unless the hold restores, the brake is written again before the repeat.
 const REPEAT_PERIOD: Duration = Duration::from_millis(100);
 /// How often a hold is repeated while a joint whose set-point moves was not measured yet. All repeats together take at least
 /// 0.2 s, and an arm takes 0.2 s to measure its joints after power-up.
@@ -237,7 +237,7 @@ impl ArmHold {
                 0 => target,
                 _ => position.and_then(|position| self.held_target(joint, position, target, held)),
             };
-            // In a stream, write the target of a joint that keeps it, too: the points ahead would move the joint.
+            // In a stream, also write the target of a joint that keeps it. Otherwise older points would still move the joint.
             *wanted = kept.map_or(position, |kept| self.is_streaming.then_some(kept));
         }
         let present = present.map(Option::unwrap_or_default);

@@ -32,9 +32,9 @@ pub(crate) struct ArmSerial(Arc<PortState>);
 #[derive(Debug, Default)]
 struct PortState {
     boxes: Mutex<Boxes>,
-    /// The inbox has something new.
+    /// Bytes came into the inbox, or the port failed.
     arrived: Notify,
-    /// The outbox is empty.
+    /// The bytes of the outbox were written, or the port failed.
     written: Notify,
 }
 

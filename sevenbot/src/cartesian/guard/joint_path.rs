@@ -21,7 +21,7 @@ const STEP_DEGREES: f64 = 0.1;
 pub struct JointPath {
     from: [f64; 5],
     to: [f64; 5],
-    /// How long each joint turns, in seconds.
+    /// How long each joint turns, in seconds. Always 1 in [`Self::together`], where only the fraction of the way counts.
     seconds: [f64; 5],
 }
 

@@ -45,7 +45,7 @@ impl Random {
     }
 }
 
-/// Points of the arm, computed without the guard's code: elbow, wrist, tip, and the disc's edge at 24 angles of joint 6.
+/// Points of the arm, computed without the guard's code: elbow, wrist, tip, and 24 points of the disc's edge.
 fn points([t1, t2, t3, t4, t5]: [f64; 5]) -> Vec<Vector> {
     let frames = |t6: f64| forward([t1, t2, t3, t4, t5, t6]);
     let Frames { arm, hand } = frames(90.0);

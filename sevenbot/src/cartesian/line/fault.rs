@@ -16,7 +16,7 @@ pub struct StraightLineError {
     pub at_mm: f64,
     /// The length of the line, in millimetres.
     pub length_mm: f64,
-    /// The tip at the point.
+    /// The position of the tip at the point, in millimetres.
     pub tip: Vector,
     /// The reason.
     pub fault: StraightLineFault,

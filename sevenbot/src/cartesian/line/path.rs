@@ -21,8 +21,7 @@ impl TipPath {
         let way = tip - start.tip;
         let turn_degrees = angle_between(start.tool, tool);
         let beside = tool - start.tool * start.tool.dot(tool);
-        // A half turn can go in any direction. The tool turns through straight up, or through forward if it starts nearly
-        // vertical.
+        // A half turn can go in any direction. The tool turns upwards, or forward if it starts nearly vertical.
         let other =
             if start.tool.z.abs() < 0.9 { Vector::new(0.0, 0.0, 1.0) } else { Vector::new(0.0, 1.0, 0.0) };
         let other = other - start.tool * start.tool.dot(other);

@@ -27,7 +27,7 @@ pub(crate) enum Effect {
     During(&'static str, Option<u64>),
     /// A request to the simulator during the command.
     Request(&'static str),
-    /// The servo of joint 2 latches an overload during the command.
+    /// The servo of joint 2 lets go during the command: see [`trip`].
     Trip,
     /// The port is unplugged during the command.
     Unplugged,

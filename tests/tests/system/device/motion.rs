@@ -94,7 +94,7 @@ fn d11_a_change_of_speed_has_an_effect_on_the_present_move() {
             arm.write(SPEED, &[100]);
             arm.wait_until_still();
             arm.wait_until("joint 1 is at its target", |arm| near(arm.register(PRESENT_POSITION), 128));
-            // At the old speed, 20 s would remain.
+            // At the old speed, almost 20 s would remain.
             start.elapsed() < Duration::from_secs(15)
         });
     });

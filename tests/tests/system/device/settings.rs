@@ -45,7 +45,7 @@ fn d19_a_frame_of_settings_is_kept_completely_or_not_at_all() {
         let mut last = 0;
         for round in 1..=10_u8 {
             arm.write(EEPROM_LOCK, &[0]);
-            // The kill comes during these frames. In later rounds more of them are complete.
+            // The kill comes during these frames. In later rounds more of them may be complete.
             for n in 1..=round * 2 {
                 arm.write(DEVICE_ID, &frame(round * 16 + n % 16));
             }

@@ -276,7 +276,7 @@ fn frames_sent_byte_by_byte_have_the_same_replies() {
             for &byte in &stream {
                 arm.send(&[byte]);
             }
-            // Its reply comes last, and is the only empty one.
+            // The reply to this read comes last, and is the only empty one.
             arm.send(&read_request(0, 0));
             let values = std::iter::from_fn(|| Some(arm.reply().values).filter(|values| !values.is_empty()));
             values.collect::<Vec<_>>() == [vec![7, 30], vec![1]]

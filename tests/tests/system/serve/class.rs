@@ -144,7 +144,7 @@ fn strangers_keep_neither_the_teacher_nor_the_class_out() {
     assert!(strangers.len() >= 64, "{} strangers", strangers.len());
     let mut teacher = class.teacher();
     shown(&mut teacher, |class| class["pupils"] == json!([]));
-    // The server ends the strangers' connections after ten seconds, and one second for each to close its end.
+    // The server ends a stranger's connection after ten seconds, and then gives the stranger one second to close its end.
     let mut mia = wait_for("a place", || class.try_join("Mia").ok_or_else(|| "the class is full".to_owned()));
     mia.tab.hear("ask");
     shown(&mut teacher, |class| tile(class, "Mia")["presence"] == "here");

@@ -3,7 +3,7 @@
 //! The test lasts `SERVE_LOAD_SECONDS`, by default 5 s. A quarter of an hour:
 //!
 //! ```sh
-//! SERVE_LOAD_SECONDS=900 cargo nextest run -p system-tests --test system serve::load --no-capture
+//! SERVE_LOAD_SECONDS=900 cargo test -p system-tests --test system serve::load -- --nocapture
 //! ```
 
 use std::fmt::Debug;
@@ -37,7 +37,7 @@ struct Tally {
     /// Replies with the value that the program wrote directly before.
     replies: usize,
     reports: usize,
-    /// Reads without a reply.
+    /// Requests without a reply.
     lost: usize,
     /// Replies of another program, and reports that the program did not ask for.
     crossed: usize,

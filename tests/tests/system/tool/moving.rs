@@ -118,7 +118,7 @@ fn run(arm: &StartedArm, arguments: &[&str]) -> String {
 fn stop_waits_for_an_arm_that_was_just_switched_on() {
     // The test does not wait until this arm has started.
     let mut arm = StartedArm::start(ArmKind::Simulator, Vec::new());
-    // The level forearm droops by 0.7 degrees as soon as it has torque.
+    // The level forearm droops by about half a degree as soon as it has torque, so joint 3 may read 66.
     let held = run(&arm, &["stop"]);
     let is_standard = ["90 90 65 90 90 90 80\n", "90 90 66 90 90 90 80\n"].contains(&held.as_str());
     assert!(is_standard, "not 0, the value before the first reading: {held}");

@@ -53,7 +53,7 @@ pub(crate) fn words<'a>(text: &'a str, first: &str) -> Vec<&'a str> {
     line.unwrap_or_else(|| panic!("no line with {first} in:\n{text}")).split_whitespace().collect()
 }
 
-/// Runs the tool without a port, and without the simulators of other tests.
+/// Runs the tool without a port, unless the arguments name one, and without the simulators of other tests.
 pub(crate) fn run_without_arm(arguments: &[&str]) -> Output {
     let mut tool = tool();
     tool.args(arguments).env_remove("SEVENBOT_PORT").env("XDG_RUNTIME_DIR", "/dev/null");

@@ -85,7 +85,7 @@ fn a_lost_baud_rate_is_found() {
     assert!(lost.contains("baud --find"), "{lost}");
     let found = wait_for("the rate is found", || {
         let output = run(&["baud", "--find"]);
-        // The tool asks for 0.2 s at each rate, which is short on a busy machine.
+        // At each rate the tool asks twice, and waits 0.2 s for each answer, which is short on a busy machine.
         if output.status.success() { Ok(succeeded(output)) } else { Err(failed(&output, 3)) }
     });
     assert!(found.contains("now            57600 baud"), "{found}");

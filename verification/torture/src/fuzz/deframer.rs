@@ -1,9 +1,9 @@
 //! The deframer against the simple model of the framing tests (D1 to D5), in two ways:
 //!
 //! - If frames are pulled after every piece, the deframer returns the results of the model in the same order.
-//! - If frames are pulled late, while bytes wait for room, the deframer returns at least the results of the model for the
-//!   stream without its short silences, and no result that the stream does not contain. Frames inside another frame may or
-//!   may not be returned, depending on the time of a pull (D4).
+//! - If frames are pulled late, bytes wait for room. The deframer then returns at least the results of the model for the stream
+//!   without its short silences. It returns no result that the stream does not contain. Whether it returns a frame inside
+//!   another frame depends on the time of a pull (D4).
 
 use std::iter;
 

@@ -32,8 +32,8 @@ const fn low_byte(at: u8) -> Option<u8> {
     }
 }
 
-/// If `at` is a byte of a two-byte register for which the write has to be refused: the reason, and the address of the low byte
-/// (D22). `None` if the register is written whole and its value is in range, or if it is no writable two-byte register.
+/// The reason to refuse a write because of the two-byte register that holds `at`, and the address of its low byte (D22).
+/// `None` if the register is written whole with a value in range, or if it is no writable two-byte register.
 pub(crate) fn word_offence(items: &[(u8, u8)], at: u8) -> Option<(u8, u8)> {
     let low = low_byte(at)?;
     let Some(value) = word(items, low) else { return Some((refusal::HALF_A_WORD, low)) };

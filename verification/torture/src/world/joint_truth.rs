@@ -119,7 +119,7 @@ impl JointTruth {
         self.lost_at.max(self.alarm_at).max(self.unpowered_at).is_some_and(|at| now - at < ENGAGE_TIME)
     }
 
-    /// True if the controller may take the joint for let go (D28): it has an alarm, or it lost its torque or power, or an alarm
+    /// True if the controller may take the joint for let go (D28). The joint has an alarm, it lost its torque or power, an alarm
     /// kept it from getting torque, or the torque command may be lost.
     pub(super) fn may_be_let_go(&self, now: Instant) -> bool {
         let has_alarm = self.alarm_at.is_some_and(|at| now - at < NOTICE_TIME);

@@ -1,4 +1,4 @@
-//! The verdict of the limits on a write (D25). This file does not know registers.
+//! The verdict of the limits on a write (D25). This file does not know the register map.
 
 pub(crate) use crate::linkage_goals::LINKAGE;
 

@@ -31,7 +31,7 @@ pub(super) use bounds::Exemption;
 use bounds::{AngleRange, JointBounds};
 use received_commands::{DecodedCommand, ReceivedCommands, millidegrees};
 
-/// The time between two checks. A fall of the joint with the heaviest load exceeds the tolerance within 30 ms.
+/// The time between two checks. A joint that falls needs longer to exceed its tolerance.
 const CHECK_PERIOD: Duration = Duration::from_millis(5);
 /// Millidegrees per second by which the range shrinks behind the joint. A servo far from its goal moves at 372 degrees/s.
 const SHRINK_PER_SECOND: u64 = 80_000;

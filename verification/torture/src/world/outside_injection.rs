@@ -21,7 +21,7 @@ const AFTER_STOP: Duration = Duration::from_millis(3_000);
 /// engages within this time.
 const TRIPS: u8 = 5;
 const TRIP_PERIOD: Duration = Duration::from_millis(6_000);
-/// A wall is at most this far from the joint, in millidegrees.
+/// A wall or a thing is at most this far from the joint, in millidegrees.
 const FARTHEST_WALL: i32 = 40_000;
 /// The strongest push on joints 1 to 4 and on joints 5 to 7, in millinewton metres: below the stall torque of their
 /// servos. A stronger push turns a joint so fast that the controller rejects its readings (D12).

@@ -69,8 +69,8 @@ pub(crate) struct RegisterModel {
     pub(crate) held_targets: PerJoint<Option<u8>>,
     /// The targets that the arm may have set itself (D27, D28).
     pub(crate) own_targets: PerJoint<OwnTarget>,
-    /// The outcome of the next write under the limits, if the arm's registers tell it: `Some(Some(register))` for a refusal that
-    /// names this register, `Some(None)` if the limits allow the write.
+    /// The outcome of the next write under the limits, if the arm's registers tell it. `Some(Some(register))`: a refusal names this
+    /// register. `Some(None)`: the limits allow the write.
     pub(crate) told: Option<Option<u8>>,
     /// The possible outcomes of the last request under the limits.
     outcomes: Vec<Option<u8>>,
@@ -292,7 +292,7 @@ impl RegisterModel {
         }
     }
 
-    /// True if the set-point period was not 0 at any time since power-up, so that fine targets may be points of a stream (D23).
+    /// True if the set-point period was above 0 since power-up, so that fine targets may be points of a stream (D23).
     pub(crate) const fn has_streams(&self) -> bool {
         self.has_streams
     }

@@ -45,7 +45,7 @@ struct Known {
     is_read_off: bool,
     /// How many times in a row its torque was read as off.
     offs: u8,
-    /// As `offs`, without the first answers after a silence, which the controller may not accept.
+    /// As `offs`, without the first answers after a silence, which the controller may reject.
     taken_offs: u8,
     /// True if its torque was read as off [`LOST_BY`] times in a row since it was last given torque.
     was_lost: bool,

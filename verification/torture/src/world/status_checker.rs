@@ -102,7 +102,7 @@ impl StatusChecker {
         Ok(())
     }
 
-    /// The pump register was written: a release opens the valve for the full time, even if it is open already.
+    /// The pump register was written: the time of an open valve begins anew, because a suction and a release may come in one poll.
     pub(super) fn vacuum_written(&mut self, now: Instant) {
         self.valve_open_since = self.valve_open_since.map(|_| now);
     }

@@ -3,7 +3,7 @@
 use browser_tests::Viewed;
 use serde_json::json;
 
-/// How much the memory may grow, in bytes: less than one picture of the arm.
+/// How much the memory may grow, in bytes.
 const GROWTH: f64 = 3e6;
 
 #[test]

@@ -166,7 +166,7 @@ fn a_stop_of_another_program_ends_a_movement_that_is_played() {
     let viewed = Viewed::with_arm();
     let mut page = viewed.open();
     open_slow_movement(&viewed, &mut page);
-    // A second attempt begins where the first one ended.
+    // A second attempt begins where the first one ended, away from the start of the movement.
     page.type_into("#approach", "2");
     viewed.stop_by_another_program(&mut page, "play");
     check_it_stands(&mut page);

@@ -80,8 +80,8 @@ fn print_percentiles(what: &str, mut times: Vec<Duration>) {
     println!("{:10.3} ms, 99 of 100 under {:.3} ms: {what}", millis(percentile(50)), millis(percentile(99)));
 }
 
-/// Prints the load of idle arms, and of arms that a host polls at 100 Hz each. The load at 100 Hz is computed from the cost of a
-/// reply, which hardly depends on the rate.
+/// Prints the load of idle arms, and of arms that a host polls at up to 100 Hz each. The load at 100 Hz is computed from the cost
+/// of a reply, which hardly depends on the rate.
 fn print_arms(program: &Path) -> Outcome {
     println!(
         "\nArms in one process, each with its settings in a file and its bytes paced at 115200 baud. Shares of a core;"

@@ -48,7 +48,7 @@ const OUTAGE: Duration = Duration::from_millis(3_500);
 const LATE: Duration = Duration::from_millis(2_000);
 /// The timeout of one read in [`wait_for_arm`]. It is long: fifty programs use the line, and the machine may be busy.
 const ANSWERED: Duration = Duration::from_secs(5);
-/// Kilobytes by which the server may grow.
+/// KiB by which the memory of the server may grow.
 const MOST_GROWTH: u64 = 8_192;
 
 #[test]

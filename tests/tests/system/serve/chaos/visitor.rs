@@ -16,13 +16,14 @@ use super::web_visits::WebVisit;
 use super::wire::{Security, WayIn};
 use crate::serve::line_history::LineHistory;
 
-/// A reply that has not come after this time is lost. Other frames before it start the time again on a pseudo-terminal.
+/// A reply that has not come after this time is lost. On a pseudo-terminal, bytes before the first reply start
+/// the time again, because they may be for an earlier program.
 const LOST: Duration = Duration::from_secs(30);
 /// A reply is lost after this time even if other frames come: reports, and replies to an earlier program.
 const LONGEST: Duration = Duration::from_secs(120);
-/// If there was an outage during a request, its reply is lost when it has not come within this time of the request.
+/// If there was an outage during a request, a reply that has not come within this time of the request counts as cut, not as lost.
 const AFTER_OUTAGE: Duration = Duration::from_secs(1);
-/// Programs that have a register of their own, from [`SPEED`] on.
+/// The number of programs that have a register of their own, from [`SPEED`] on.
 const OWNERS: u8 = 14;
 
 /// What all programs share.

@@ -168,7 +168,7 @@ impl ByteWire {
         }
     }
 
-    /// Resets the connection: bytes that were not delivered are lost. A terminal can only be closed.
+    /// Resets a TCP connection: bytes that were not delivered are lost. A terminal or a Unix socket can only be closed.
     pub(crate) fn reset(self) {
         match &self {
             Self::Terminal(_) => {}

@@ -203,7 +203,8 @@ fn stop(stopper: &mut Program, line: &Line) -> (StopTimes, Vec<u8>) {
     panic!("the arm did not take a stop");
 }
 
-/// Checks that no other program's target has reached the arm since the stop. The other programs write coarse targets.
+/// Checks that since the stop no frame reached the arm that begins with a coarse target. This covers the targets of all other
+/// programs, except those of [`Attack::LongWrites`], whose frames begin at register 0.
 #[track_caller]
 fn check_rests(line: &Line, stop: &[u8], context: &str) {
     let line = line.lock().expect("no panic");

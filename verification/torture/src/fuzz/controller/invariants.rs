@@ -1,6 +1,10 @@
-//! The invariants: replies match the registers and come after the save of settings, goals do not jump and keep the linkage,
-//! torque is off outside motor state servo, the valve closes, registers stay in their ranges, storage errors are flagged, and
-//! fine targets and positions match the coarse ones.
+//! The invariants:
+//!
+//! - Replies match the registers, and come after the save of settings.
+//! - Goals do not jump, and keep the linkage.
+//! - Torque is off outside motor state servo. The valve closes.
+//! - Registers stay in their ranges. Fine targets and positions match the coarse ones.
+//! - Storage errors are flagged.
 
 use motion_core::calibration::{MicroDegrees, angle_from_counts};
 use motion_core::servo_bus::Torque;

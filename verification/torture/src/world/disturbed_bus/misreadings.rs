@@ -7,8 +7,8 @@ use crate::per_joint::PerJoint;
 
 /// The controller may accept a false reading if two undetected errors come within this time.
 const MISREAD_TIME: Duration = Duration::from_millis(1_000);
-/// The largest error in counts of a single false reading that the controller accepts: 8 for a joint at rest, and 15 more for a
-/// joint that sinks slowly and is read four times a second.
+/// The largest error of a single false reading that the controller accepts, in counts: 8 for a joint at rest. A joint that sinks
+/// slowly and is read four times a second has 15 more.
 const TOLERANCE: u64 = 8 + 15;
 
 /// The undetected errors of all servos.

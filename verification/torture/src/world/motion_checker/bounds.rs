@@ -63,8 +63,8 @@ impl AngleRange {
 pub(super) struct JointBounds {
     /// Why the joint may move without a goal, and the earliest end of the exemption.
     pub(super) exemption: Option<(Exemption, Instant)>,
-    /// The last goal that its servo has received since it had power and since the start of an exemption other than an alarm, in
-    /// millidegrees.
+    /// The last goal that its servo has received, in millidegrees. `None` from the start of an exemption other than an alarm until
+    /// the next goal.
     pub(super) goal: Option<i32>,
     /// True if its servo had no power, and has received no goal since then.
     pub(super) awaits_goal: bool,

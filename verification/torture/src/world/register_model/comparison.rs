@@ -7,7 +7,7 @@ use super::super::{extended_model, map21_model};
 use super::{OwnTarget, RegisterModel};
 use crate::violation::{Check, ensure};
 
-/// The ranges of registers whose values follow only from requests: first and last address.
+/// The ranges of registers whose values the model knows: first and last address.
 const MODELLED: &[(u8, u8)] = &[
     (0, 45),
     (53, 53),

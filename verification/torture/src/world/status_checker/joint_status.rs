@@ -19,7 +19,7 @@ use crate::world::protection_model::PROTECTION;
 const UNCHECKED_TIME: Duration = Duration::from_millis(500);
 /// Torque is off at the latest this long after the motor state changed from servo to another.
 const RELEASE_TIME: Duration = Duration::from_millis(300);
-/// The time of a move over the whole range at the lowest speed, 1.9 degrees/s.
+/// More than the 114 s of joints 2 and 3 over the whole range of their servos at the lowest speed, 1.9 degrees/s.
 const LONGEST_MOVE: Duration = Duration::from_millis(125_000);
 
 impl StatusChecker {

@@ -10,7 +10,7 @@ use crate::world::register_model::RegisterModel;
 
 /// How much longer a move may take than its distance divided by its speed.
 const MOVE_MARGIN: Duration = Duration::from_millis(1_000);
-/// The longest time until a point of a stream is reached: two of the longest periods and a control cycle (D23).
+/// The longest time until a point of a stream is reached: two of the longest periods and a control cycle (D23), and 10 ms more.
 const MAX_STREAM_TIME: Duration = Duration::from_millis(2_020);
 /// More than any move of a set-point, in counts: from one end of a servo's range of 1,023 counts to a target beyond its other
 /// end. The range of joint 7 ends at 68 degrees with the offset -16, and its targets go up to 180 degrees.
