@@ -63,6 +63,11 @@ impl UsbAdapter {
         Self { latency, random: SplitMix64::seed_from_u64(seed), block: Vec::new(), due: Instant::ZERO }
     }
 
+    /// Drops the bytes that wait in the buffer.
+    pub fn clear(&mut self) {
+        self.block.clear();
+    }
+
     /// Takes bytes that the servos have sent by `now`.
     pub fn push(&mut self, now: Instant, bytes: &[u8]) {
         if self.block.is_empty() && !bytes.is_empty() {

@@ -35,7 +35,7 @@ pub struct AdapterConfig {
     pub link: Option<PathBuf>,
     /// The baud rate of the servos, in bits per second.
     pub baud: u32,
-    /// The latency of the adapter.
+    /// The random delay of each block of bytes from the adapter to the client.
     pub latency: Latency,
     /// The seed of the random delays of the adapter.
     pub seed: u64,
@@ -47,16 +47,9 @@ pub enum ServosOnlyError {
     /// The symbolic link cannot be created.
     #[error(transparent)]
     Symlink(#[from] SymlinkError),
-    /// The operating system failed.
+    /// The operating system failed: the port, inotify or poll(2).
     #[error("the operating system failed: {0}")]
     System(#[from] io::Error),
-}
-
-impl AdapterConfig {
-    /// An adapter in which no byte waits.
-    fn adapter(&self) -> UsbAdapter {
-        UsbAdapter::new(self.latency, self.seed)
-    }
 }
 
 /// The servos, their wire and the adapter, which may be unplugged.
@@ -97,7 +90,7 @@ impl ServosOnly {
         plant.ignore_collisions();
         plant.set_baud(config.baud);
         let port = Some(AdapterPort::open(config.link.as_ref())?);
-        let adapter = config.adapter();
+        let adapter = UsbAdapter::new(config.latency, config.seed);
         Ok(Self { config, plant, adapter, port, trace: None })
     }
 
@@ -139,7 +132,7 @@ impl ServosOnly {
 
     /// Unplugs or plugs in the adapter. The servos keep their power.
     fn unplug_or_plug_in(&mut self) -> Result<(), ServosOnlyError> {
-        self.adapter = self.config.adapter();
+        self.adapter.clear();
         if self.port.take().is_some() {
             info!("adapter unplugged");
             return Ok(());
@@ -168,7 +161,7 @@ impl ServosOnly {
         if let Some(clients) = clients {
             clients.update()?;
             if pty.update_clients(clients)? {
-                self.adapter = self.config.adapter();
+                self.adapter.clear();
             }
         }
         let bytes = bytes.get(..count).unwrap_or(&[]);

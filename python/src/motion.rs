@@ -89,7 +89,8 @@ pub(crate) fn park(
     match (path, pose) {
         (Some(path), Some(pose)) if keep => Ok(park_poses::keep(&path, &chip, &pose).map(|()| parked)),
         (None, Some(_)) if keep => {
-            let reason = "parked, but the pose is not kept: this user has no directory for settings";
+            let reason =
+                "parked, but the pose is not kept: this user has no directory for settings; set HOME";
             Ok(Err(io::Error::new(io::ErrorKind::NotFound, reason)))
         }
         _ => Ok(Ok(parked)),
@@ -213,7 +214,6 @@ pub(crate) struct RecordOptions {
 
 #[derive(Debug, Default)]
 pub(crate) struct Recorded {
-    /// The text of the recording.
     pub(crate) text: String,
     /// When each moment arrived here, in seconds since the first.
     pub(crate) arrivals: Vec<f64>,
@@ -282,7 +282,6 @@ fn record_reports(
     if watch.is_stopped() { Err(MoveError::Interrupted) } else { Ok(()) }
 }
 
-/// How a recording is played.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PlayOptions {
     pub(crate) factor: f64,

@@ -4,7 +4,7 @@
 //! result is there.
 
 use std::fs::{self, File};
-use std::io::{self, IsTerminal, Stdout};
+use std::io::{self, IsTerminal, Stdout, Write};
 use std::path::{Path, PathBuf};
 
 use sevenbot::whole_file;
@@ -19,11 +19,11 @@ pub(crate) struct ForceArg {
     pub(crate) force: bool,
 }
 
-/// A file for a result.
 #[derive(Debug)]
 pub(crate) struct OutputFile {
     path: PathBuf,
-    file: File,
+    /// `None` while it is replaced: some file systems of Windows replace no open file.
+    file: Option<File>,
     /// It did not exist before, and is removed unless its result is written.
     is_new: bool,
 }
@@ -41,7 +41,7 @@ impl OutputFile {
         // A new file does not follow a link that another user planted.
         let opened = File::options().write(true).create_new(is_new).open(path);
         let file = opened.map_err(|error| CommandError::file(path, error))?;
-        Ok(Self { path: path.to_owned(), file, is_new })
+        Ok(Self { path: path.to_owned(), file: Some(file), is_new })
     }
 
     pub(crate) fn path(&self) -> &Path {
@@ -50,7 +50,9 @@ impl OutputFile {
 
     /// Writes the content. An existing file is replaced by the whole content, or not at all.
     pub(crate) fn write(mut self, content: &[u8]) -> Result<(), CommandError> {
-        let written = whole_file::write(&self.path, content);
+        let special = self.file.take().filter(|file| file.metadata().is_ok_and(|there| !there.is_file()));
+        let written = special
+            .map_or_else(|| whole_file::write(&self.path, content), |mut special| special.write_all(content));
         self.is_new &= written.is_err();
         written.map_err(|error| CommandError::file(&self.path, error))
     }
@@ -58,10 +60,17 @@ impl OutputFile {
     /// Empties the file, for a result that is written part by part.
     pub(crate) fn begin(mut self) -> Result<File, CommandError> {
         self.is_new = false;
-        // A pipe has no length.
-        let emptied = if self.path.is_file() { self.file.set_len(0) } else { Ok(()) };
-        emptied.and_then(|()| self.file.try_clone()).map_err(|error| CommandError::file(&self.path, error))
+        let emptied = self.file.take().ok_or_else(|| io::ErrorKind::NotFound.into()).and_then(emptied);
+        emptied.map_err(|error| CommandError::file(&self.path, error))
     }
+}
+
+/// A pipe has no length.
+fn emptied(file: File) -> io::Result<File> {
+    if file.metadata()?.is_file() {
+        file.set_len(0)?;
+    }
+    Ok(file)
 }
 
 impl Drop for OutputFile {

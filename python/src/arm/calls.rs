@@ -97,7 +97,7 @@ impl Arm {
     /// Parks the arm. With `keep`, also saves `pose` as the park pose of this arm.
     pub(super) fn park_at(&self, py: Python<'_>, pose: Option<FineTargets>, keep: bool) -> PyResult<Angles> {
         let parked = self.worker.call(py, move |arm, watch| motion::park(arm, pose, keep, watch))?;
-        let path = sevenbot::park_poses::path().unwrap_or_default();
+        let path = sevenbot::park_poses::path().unwrap_or_else(|| "park-poses".into());
         Ok(raised(py, parked)?.map_err(|why| file_error(py, &path, &why))?.into())
     }
 

@@ -18,13 +18,13 @@ use crate::names::name_of_register;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct WriteMismatch {
-    /// The register.
+    /// The address of the register; of a two-byte register, its low byte.
     pub address: u8,
     /// The raw value that was written. For a two-byte register, both bytes as one number.
     pub wanted: u16,
     /// The raw value that was read back.
     pub found: u16,
-    /// The reason.
+    /// Why the register does not hold what was written.
     pub cause: MismatchCause,
 }
 
@@ -101,7 +101,8 @@ pub(super) fn number(address: u8, raw: u16) -> i32 {
 #[must_use]
 pub fn reasons(unchanged: &[WriteMismatch]) -> String {
     let width = |of: &WriteMismatch| find_readable(of.address).map_or(1, |row| row.range.width());
-    let is_next = |one: &WriteMismatch, next: &WriteMismatch| next.address - one.address == width(one);
+    let is_next =
+        |one: &WriteMismatch, next: &WriteMismatch| one.address.checked_add(width(one)) == Some(next.address);
     let groups = unchanged.chunk_by(|one, next| one.cause == next.cause && is_next(one, next));
     groups.map(reason).collect::<Vec<String>>().join("\n       ")
 }
@@ -146,5 +147,6 @@ mod tests {
             "{text}"
         );
         assert!(lines[2].starts_with("fine-target.1 to fine-target.2"), "{text}");
+        assert_eq!(reasons(&[189, 53].map(mismatch)).lines().count(), 2, "in the order of the writes");
     }
 }

@@ -18,7 +18,7 @@ const CAPACITY: usize = 4_096;
 /// The socket is not read while this many bytes wait for a host that reads late. A wire never makes the chip wait. QEMU does, if
 /// its socket is full: the machine stands still, and its clock goes on. The firmware takes this time for a pause inside a frame,
 /// and drops the frame (D4).
-const WAITING_FOR_HOST: usize = 1 << 20;
+const WAITING_FOR_HOST: usize = 1 << 16;
 /// The longest sleep while the firmware's log is printed, because the log has to be polled.
 const POLL_PERIOD: Timespec = Timespec { tv_sec: 0, tv_nsec: 50_000_000 };
 
@@ -40,7 +40,6 @@ impl Relay {
         Ok(Self { clients, port, socket, to_arm: Vec::new(), to_host: Vec::new() })
     }
 
-    /// The path of the port.
     pub(crate) fn port(&self) -> &Path {
         self.port.path()
     }

@@ -272,7 +272,9 @@ impl App {
         let Ok(source) = SocketSource::connect_with(&query) else { return };
         let chosen = self.dom.choice("source");
         let (line, client) = self.swap_line((Line::Remote(Box::new(source)), Client::default()));
-        self.set_aside.get_or_insert(OwnArm { line, client, chosen });
+        if chosen != "server" || self.set_aside.is_none() {
+            self.set_aside = Some(OwnArm { line, client, chosen });
+        }
         self.dom.choose("source", "server");
         self.dom.notice(self.language.text("arm-begins"));
     }

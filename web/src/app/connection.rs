@@ -7,6 +7,7 @@ use super::dom::set_attribute;
 use super::events::TOUR;
 use super::page::{App, Line};
 use super::storage;
+use crate::client::Client;
 use crate::source::LineState;
 use crate::source::serial::SerialSource;
 use crate::source::socket::SocketSource;
@@ -34,7 +35,10 @@ impl App {
     pub(super) fn choose_source(&mut self) {
         let line = match self.dom.choice("source").as_str() {
             "server" => self.server_arm().map(|source| Line::Remote(Box::new(source))).ok(),
-            "usb" => SerialSource::ask().map(|source| Line::Remote(Box::new(source))),
+            "usb" => {
+                self.close_set_aside_usb();
+                SerialSource::ask().map(|source| Line::Remote(Box::new(source)))
+            }
             _ => Some(Line::Simulated(Box::default())),
         };
         match line {
@@ -49,6 +53,15 @@ impl App {
                 self.set_line(Line::Simulated(Box::default()));
                 self.dom.notice(self.language.text("no-serial"));
             }
+        }
+    }
+
+    /// Closes the USB port of an arm that is set aside, because the browser opens no port twice.
+    fn close_set_aside_usb(&mut self) {
+        if let Some(own) = self.set_aside.as_mut().filter(|own| own.chosen == "usb") {
+            own.line = Line::Simulated(Box::default());
+            own.client = Client::default();
+            own.chosen = "simulator".to_owned();
         }
     }
 

@@ -146,9 +146,8 @@ fn show_lines(session: &mut Session, args: &MonitorArgs) -> Result<(), CommandEr
 }
 
 fn write_csv(session: &Session, args: &MonitorArgs, path: &Path) -> Result<(), CommandError> {
-    let output = OutputFile::open(path, None, args.force)?;
     let mut arm = session.connect()?;
-    let mut file = LineFile::begin(output)?;
+    let mut file = LineFile::begin(OutputFile::open(path, None, args.force)?)?;
     let mut write = |line: String| file.add(&format!("{line}\n"));
     write(LineFormat::Csv.head())?;
     each_sample(&mut arm, args.period(), args.samples.unwrap_or(u64::MAX), |sample| {

@@ -67,7 +67,7 @@ An MCAP file has messages of ROS 2, in radians: /joint_states, /tf and
 
 Exit status 1 if a servo does not answer, because the joint's position is
 unknown then, or if the controller restarts. The file has what was recorded
-before.")]
+before. Also 1 if it ends before the first moment: then no file has changed.")]
 pub(crate) struct RecordArgs {
     /// The text file for the recording.
     file: Option<PathBuf>,
@@ -91,7 +91,6 @@ pub(crate) struct RecordArgs {
 /// The longest wait for a report. Then keys and Ctrl-C are checked again.
 const POLL_PERIOD: Duration = Duration::from_millis(20);
 
-/// The result of `record`.
 #[derive(Debug, Serialize)]
 struct Recorded {
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -19,6 +19,8 @@ const REPLACE: ForceArg = ForceArg { force: true };
 /// The files of a recording. All of them get the same moments.
 pub(crate) struct Outputs {
     lines: RecordingLines,
+    /// The moments in the files, and the time of the last one.
+    written: (u64, Duration),
     /// The files until the first moment. So existing ones keep their content if nothing is recorded.
     opened: Option<Opened>,
     text: Option<LineFile>,
@@ -56,13 +58,20 @@ impl Outputs {
         }
         let text = text.map(|path| OutputFile::open(path, None, REPLACE)).transpose()?;
         let opened = Some(Opened { text, mcap: mcap.map(McapOutput::open).transpose()? });
-        Ok(Self { lines: RecordingLines::new(version), opened, text: None, mcap: None, start: None })
+        Ok(Self {
+            lines: RecordingLines::new(version),
+            written: (0, Duration::ZERO),
+            opened,
+            text: None,
+            mcap: None,
+            start: None,
+        })
     }
 
     /// Empties the files, and writes their heads.
     fn begin(&mut self, Opened { text, mcap }: Opened) -> Result<(), CommandError> {
-        self.text = text.map(LineFile::begin).transpose()?;
         self.mcap = mcap.map(McapFile::begin).transpose()?;
+        self.text = text.map(LineFile::begin).transpose()?;
         self.text.as_mut().map_or(Ok(()), |file| file.add(&self.lines.head()))
     }
 
@@ -71,6 +80,7 @@ impl Outputs {
         let Some(line) = self.lines.add(moment) else { return Ok(()) };
         self.opened.take().map_or(Ok(()), |opened| self.begin(opened))?;
         self.text.as_mut().map_or(Ok(()), |file| file.add(&line))?;
+        self.written = (self.lines.count(), self.lines.duration());
         let at = self.start() + moment.time;
         self.mcap.as_mut().map_or(Ok(()), |file| file.write(|writer| writer.add(at, moment, telemetry)))
     }
@@ -87,12 +97,12 @@ impl Outputs {
     }
 
     pub(crate) const fn count(&self) -> u64 {
-        self.lines.count()
+        self.written.0
     }
 
     /// The time of the last moment.
-    pub(crate) fn duration(&self) -> Duration {
-        self.lines.duration()
+    pub(crate) const fn duration(&self) -> Duration {
+        self.written.1
     }
 
     /// Finishes the MCAP file. The text file needs no end. Fails if nothing was recorded.
@@ -144,12 +154,15 @@ impl McapOutput {
 
 impl McapFile {
     fn begin(output: McapOutput) -> Result<Self, CommandError> {
-        let (path, out): (_, Box<dyn Write>) = match output {
-            McapOutput::Stdout(stdout) => (PathBuf::from("-"), Box::new(stdout)),
-            McapOutput::File(file) => (file.path().to_owned(), Box::new(file.begin()?)),
+        let (path, is_file, out): (_, _, Box<dyn Write>) = match output {
+            McapOutput::Stdout(stdout) => (PathBuf::from("-"), false, Box::new(stdout)),
+            McapOutput::File(file) => {
+                let path = file.path().to_owned();
+                (path.clone(), path.is_file(), Box::new(file.begin()?))
+            }
         };
         // A pipe is read while it is written, so it needs each message at once.
-        let layout = if path.is_file() { McapLayout::Indexed } else { McapLayout::Live };
+        let layout = if is_file { McapLayout::Indexed } else { McapLayout::Live };
         let writer = McapWriter::new(out, layout).map_err(|error| failed(&path, error))?;
         Ok(Self { path, writer })
     }

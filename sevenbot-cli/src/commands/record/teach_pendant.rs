@@ -24,7 +24,6 @@ pub(crate) struct TeachPendant {
     progress: Progress,
 }
 
-/// A command from a key.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum KeyCommand {
     End,
