@@ -62,7 +62,6 @@ pub(crate) struct ModelJoint {
     pub(crate) motion: Motion,
 }
 
-/// How a joint moves.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Motion {
     Fixed,

@@ -27,7 +27,7 @@ pub struct Mesh {
     pub positions: Vec<[f32; 3]>,
     /// Direction out of the solid at each corner, of length 1.
     pub normals: Vec<[f32; 3]>,
-    /// Finish of each corner.
+    /// The kind of part that each corner belongs to; a renderer chooses the colour by it.
     pub finishes: Vec<Finish>,
 }
 

@@ -95,7 +95,7 @@ fn defaults(out: &mut XmlDocument) -> io::Result<()> {
     out.end()
 }
 
-/// A make of servo.
+/// A default class of the model, for the joints with the same make of servo.
 struct ServoClass {
     name: &'static str,
     /// A joint with a servo of this class.

@@ -7,13 +7,11 @@ use quick_xml::events::{BytesEnd, BytesStart, BytesText, Event};
 
 use crate::chain::Axes;
 
-/// An XML document under construction.
 pub(crate) struct XmlDocument {
     writer: Writer<Vec<u8>>,
     open: Vec<&'static str>,
 }
 
-/// Names and values of attributes.
 pub(crate) type Attributes<'a> = &'a [(&'static str, String)];
 
 impl XmlDocument {

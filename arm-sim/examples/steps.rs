@@ -13,7 +13,6 @@ use arm_sim::request::Request;
 use arm_sim::{Duration, Simulation, SimulationConfig};
 use protocol_core::registers::map::{BLOCKED_JOINTS, FINE_POSITION, FINE_TARGET, SET_POINT_PERIOD};
 
-/// The time of a step.
 const STEP: Duration = Duration::from_millis(20);
 /// Steps in a second.
 const SECOND: u32 = 50;

@@ -4,14 +4,13 @@
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FaultCount {
-    /// How often it took effect.
+    /// How often it took effect; never more than `occasions`.
     pub effects: u64,
     /// How often it could have taken effect. The kind of the fault determines the unit.
     pub occasions: u64,
 }
 
 impl FaultCount {
-    /// Counts an occasion.
     pub(crate) const fn count(&mut self, has_effect: bool) {
         self.count_many(1, has_effect);
     }

@@ -51,7 +51,7 @@ pub enum ArmFault {
     GoalStartsTorque,
 }
 
-/// Where a fault is.
+/// Where a fault is: the part of its text before the first `=`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum FaultLocation {
@@ -249,7 +249,7 @@ impl ArmFault {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FaultReport {
-    /// The fault.
+    /// The fault. Its text is that of a command line, such as `3=missing`.
     pub fault: ArmFault,
     /// When it ends by itself. `None`: it stays until it is removed.
     pub until: Option<Instant>,

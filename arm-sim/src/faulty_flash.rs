@@ -43,7 +43,7 @@ impl Display for FlashFault {
     }
 }
 
-/// Why an operation failed.
+/// The error of a flash that can have a [`FlashFault`].
 #[derive(Debug)]
 pub enum FlashError<E> {
     /// [`FlashFault::Fails`] refuses the operation.

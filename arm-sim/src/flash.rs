@@ -95,13 +95,13 @@ impl Flash {
 }
 
 impl<C: Cells> Flash<C> {
-    /// Sectors on these cells.
+    /// The sectors on these cells, with the bytes that the cells hold.
     #[must_use]
     pub const fn on(cells: C) -> Self {
         Self(cells)
     }
 
-    /// The cells.
+    /// The cells themselves, for example to copy a settings image.
     pub const fn cells_mut(&mut self) -> &mut C {
         &mut self.0
     }

@@ -202,7 +202,6 @@ impl LineDirection {
         CAPACITY.saturating_sub(self.len())
     }
 
-    /// Are there no bytes?
     pub(crate) fn is_empty(&self) -> bool {
         self.len() == 0
     }

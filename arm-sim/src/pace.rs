@@ -138,7 +138,6 @@ impl Pacer {
         Some(self.busy_since + Duration::from_micros(micros))
     }
 
-    /// Number of bytes in transit.
     pub(crate) fn in_transit(&self) -> usize {
         self.queue.len() - self.arrived
     }

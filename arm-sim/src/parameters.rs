@@ -62,7 +62,7 @@ pub struct ServoParameters {
     pub derivative_ms: i64,
     /// Counts in half a turn.
     pub half_turn: i64,
-    /// Counts in a thousand radians.
+    /// Counts in a thousand radians: 1000 / pi times `half_turn`, rounded.
     pub counts_per_kiloradian: i64,
 }
 

@@ -20,7 +20,7 @@ use crate::stock_controller::StockController;
 pub struct Difference {
     /// When the host took the bytes.
     pub now: Instant,
-    /// The bytes of the session.
+    /// The bytes that the host took at this time in the session.
     pub recorded: Vec<u8>,
     /// The bytes of the replaying arm, at most as many as were recorded.
     pub replayed: Vec<u8>,
@@ -57,12 +57,12 @@ pub enum ReplayError {
         /// Its number; the first is 1.
         line: usize,
     },
-    /// The arm sent other bytes.
+    /// The arm sent other bytes than in the session.
     #[error("line {line}: {difference}")]
     Different {
         /// The number of the line that differs; the first is 1.
         line: usize,
-        /// What differs.
+        /// The bytes of the session and of the replaying arm, and when the host took them.
         difference: Difference,
     },
 }

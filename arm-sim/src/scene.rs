@@ -46,14 +46,14 @@ pub enum Tool {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Form {
-    /// A cube.
+    /// A cube that stands on a face.
     Cube {
-        /// The length of an edge.
+        /// The length of an edge, 5 to 1000.
         edge: f64,
     },
     /// A cylinder that stands upright.
     Cylinder {
-        /// The diameter.
+        /// The diameter, 5 to 1000.
         diameter: f64,
         /// The distance from the foot to the top.
         height: f64,

@@ -39,16 +39,16 @@ use protection::Protection;
 use registers::ServoRegisters;
 use temperature::Temperature;
 
-/// An answer of a servo.
+/// The answer of a servo to a frame, from [`Servo::handle_frame`].
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ServoAnswer {
     /// The delay of the answer in addition to [`ServoConfig::return_delay`].
     pub delay: Duration,
-    /// The frame.
+    /// The frame. [`ServoFault::Garbled`] may have damaged it.
     pub bytes: ServoFrameBuffer,
 }
 
-/// A servo.
+/// The servo of one joint: its registers, motor, protection, temperature and fault.
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Servo {
@@ -154,7 +154,7 @@ impl Servo {
         self.fault.count()
     }
 
-    /// Changes the configuration.
+    /// Changes the configuration from now on. Registers and motion of the servo stay as they are.
     pub const fn set_config(&mut self, config: ServoConfig) {
         self.config = config;
     }

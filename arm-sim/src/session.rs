@@ -26,7 +26,7 @@ mod header;
 
 pub use header::{ControllerKind, HeaderError, SessionHeader};
 
-/// The version of the format.
+/// The version of the format: the second word of a session. Sessions of other versions are refused.
 pub const VERSION: u32 = 1;
 
 /// Receives the entries of a session while it is recorded.
@@ -35,7 +35,7 @@ pub trait SessionRecorder: Debug + Send {
     fn add(&mut self, entry: &Entry);
 }
 
-/// What an entry records.
+/// The event of an [`Entry`]. In its line the events have the marks `>`, `~` or `=`, `<` and `!`.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SessionEvent {
     /// The host started to send these bytes.
@@ -51,9 +51,9 @@ pub enum SessionEvent {
 /// Something that happened to an arm: a line of a session.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Entry {
-    /// When it happened.
+    /// When it happened, counted from power-up.
     pub now: Instant,
-    /// The event of this line.
+    /// The rest of the line, after the time.
     pub event: SessionEvent,
 }
 
@@ -95,7 +95,6 @@ impl Display for Entry {
     }
 }
 
-/// Bytes as hexadecimal digits.
 pub(crate) struct Hex<'a>(pub(crate) &'a [u8]);
 
 impl Display for Hex<'_> {

@@ -75,7 +75,6 @@ pub struct SimulatedArm<F, B = Plant, C = Controller> {
     controller_due: Instant,
     /// The controller does nothing until it is restarted.
     is_halted: bool,
-    /// The arm has no power.
     is_off: bool,
     faults: FaultList,
     ended_faults: EndedFaults,
@@ -144,7 +143,7 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
         &mut self.settings.flash_mut().flash
     }
 
-    /// The servo bus.
+    /// The servo bus, for example to pass it the bytes of real servos.
     pub const fn bus(&mut self) -> &mut B {
         &mut self.bus
     }

@@ -50,7 +50,7 @@ use crate::tap::Tap;
 /// The arm's bytes are taken off the host line at least this often, so that the line seldom fills up.
 const TAKE_PERIOD: Duration = Duration::from_millis(10);
 
-/// The configuration of a simulation.
+/// What [`Simulation::power_up`] starts an arm with.
 #[derive(Clone, Debug)]
 pub struct SimulationConfig {
     /// The chip id, most significant byte first ([D8](protocol_core::decisions#d8)).

@@ -2,7 +2,6 @@
 
 use core::fmt::{self, Display, Formatter};
 
-/// A number in thousandths.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Thousandths(pub(crate) i32);
 

@@ -23,7 +23,7 @@ pub enum FromPupil {
     Report(Report),
     /// The answer to [`ToPupil::Stop`], once the arm of the tab has confirmed it.
     Stopped {
-        /// The number of the stop.
+        /// The number in [`ToPupil::Stop`].
         number: u32,
         /// What the arm does now.
         outcome: StopOutcome,
@@ -33,7 +33,7 @@ pub enum FromPupil {
 }
 
 impl FromPupil {
-    /// The message in JSON.
+    /// The message in JSON, as [`Classroom::receive`](crate::Classroom::receive) takes it.
     #[must_use]
     pub fn to_json(&self) -> String {
         // Structures of text and numbers always become JSON.
@@ -46,7 +46,7 @@ impl FromPupil {
 pub struct Report {
     /// x, y, z in mm, see [`POINTS`]; `None` while the arm is not measured.
     pub points: Option<[[i16; 3]; POINTS]>,
-    /// Its state in one word.
+    /// What it does, for the teacher's screen.
     pub doing: Doing,
     /// The goals of the exercise in progress; `None` without an exercise.
     pub goals: Option<Goals>,
@@ -62,13 +62,13 @@ pub enum Doing {
     NoArm,
     /// It holds, and waits for a person.
     Ready,
-    /// It moves.
+    /// It moves, and none of the next three states is the reason.
     Moving,
     /// A program of blocks runs.
     Program,
     /// A recorded movement is played.
     Playing,
-    /// It is being parked.
+    /// It is being parked: moved to its park pose, and let go there.
     Parking,
     /// A stop was sent and is not confirmed yet.
     Stopping,
@@ -84,20 +84,20 @@ pub enum Doing {
     Problem,
 }
 
-/// The goals of an exercise.
+/// The progress in an exercise.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Goals {
     /// The number of goals that are reached.
     pub reached: u8,
-    /// The number of all goals.
+    /// The number of goals that the exercise has.
     pub all: u8,
 }
 
-/// How a stop ended.
+/// The state of an arm that has confirmed a stop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum StopOutcome {
-    /// The arm holds.
+    /// The motors are on, and the arm holds its position.
     Holds,
     /// The motors are off or damped: there is nothing to stop.
     Limp,
@@ -119,12 +119,12 @@ pub enum ToPupil {
     Refused(Refusal),
     /// Stop the arm of this tab, before everything else. The class repeats this message until [`FromPupil::Stopped`].
     Stop {
-        /// The number of the stop.
+        /// Counts the stops for all, from 1. [`FromPupil::Stopped`] repeats it.
         number: u32,
     },
     /// A message of the teacher; an empty text removes the last message.
     Message {
-        /// The text.
+        /// The text, at most [`LONGEST_TEXT`] characters.
         text: String,
     },
     /// Asks for a [`FromPupil::Report`], and tells who has the real arm.
@@ -142,7 +142,7 @@ pub enum ToPupil {
 pub enum Refusal {
     /// There is no letter or digit in the name.
     NoName,
-    /// There are too many pupils.
+    /// [`MOST_PUPILS`](crate::MOST_PUPILS) tabs are connected already.
     Full,
     /// The same pupil has joined in another tab.
     OtherTab,
@@ -165,7 +165,7 @@ pub struct LentArm {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LeaseEnd {
-    /// The time is over.
+    /// The time of the lease is over.
     Time,
     /// The teacher took it back, or began a new lease.
     TakenBack,
@@ -177,7 +177,7 @@ pub enum LeaseEnd {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FromTeacher {
-    /// Stops all arms.
+    /// Stops the arms of all pupils, and the real arm.
     StopAll,
     /// A message to all; an empty text removes the last message.
     Say {
@@ -186,7 +186,7 @@ pub enum FromTeacher {
     },
     /// Gives the real arm to a pupil. Another pupil who has it loses it.
     Give {
-        /// The number of the pupil.
+        /// The pupil, by [`Tile::pupil`].
         pupil: u32,
         /// The time of the lease: 1 to 3600 s.
         seconds: u32,
@@ -230,7 +230,7 @@ pub enum NotGiven {
     BadTime,
 }
 
-/// The state of the class.
+/// The state of the class. Every teacher's screen gets it each 100 to 500 ms.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ClassNews {
     /// The pupils, in the order in which they joined.
@@ -246,7 +246,7 @@ pub struct ClassNews {
 /// A pupil on the teacher's screen.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Tile {
-    /// The number of the pupil.
+    /// The number of the pupil, from 1. A later pupil of the class has another one.
     pub pupil: u32,
     /// The name of the pupil. Show it as text, not as HTML.
     pub name: String,
@@ -276,7 +276,7 @@ pub enum Presence {
 pub enum TileStop {
     /// The stop is not confirmed yet.
     Asked,
-    /// The arm holds.
+    /// The stop is confirmed, and the arm holds its position.
     Holds,
     /// The motors are off or damped.
     Limp,
@@ -294,7 +294,7 @@ impl From<StopOutcome> for TileStop {
 /// The progress of the last stop for all. The real arm counts as one arm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StopNews {
-    /// The number of the stop.
+    /// The number of the stop, as in [`ToPupil::Stop`].
     pub number: u32,
     /// The number of arms that were asked to stop.
     pub asked: usize,
@@ -307,7 +307,7 @@ pub struct StopNews {
 /// The real arm on the teacher's screen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ArmTile {
-    /// Does it answer?
+    /// Does it answer? If not, it cannot be given to a pupil.
     pub answers: bool,
     /// Whether it has confirmed the last hold: after a stop for all, a stop by a pupil, or the end of a lease. `None`
     /// before the first hold.

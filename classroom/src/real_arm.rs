@@ -9,7 +9,7 @@ use crate::stop_all::PendingStop;
 /// The state of the real arm, as the caller of the class sees it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ArmNews {
-    /// It answers.
+    /// It answers. Only then can a pupil get it.
     pub answers: bool,
     /// Requests may reach it, even if it does not answer.
     pub may_hear: bool,

@@ -16,7 +16,6 @@ const ANSWERS: ArmNews =
     ArmNews { answers: true, may_hear: true, is_holding: false, holds: false, is_limp: false };
 const HOLDS: ArmNews = ArmNews { holds: true, ..ANSWERS };
 
-/// A class, and its clock.
 struct Lesson {
     class: Classroom,
     now: Instant,

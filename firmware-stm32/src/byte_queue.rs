@@ -110,7 +110,6 @@ mod tests {
 
     use super::*;
 
-    /// Takes all bytes.
     fn drain<const N: usize>(queue: &mut ByteQueue<N>) -> Vec<u8> {
         std::iter::from_fn(|| queue.pop()).collect()
     }

@@ -42,7 +42,7 @@ impl ClockSource {
         }
     }
 
-    /// The frequencies with this source.
+    /// The frequencies with this source: the core runs at 168 MHz, with [`Self::Internal`] at 16 MHz.
     #[must_use]
     pub const fn rates(self) -> ClockRates {
         const FULL: ClockRates =

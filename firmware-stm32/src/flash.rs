@@ -89,13 +89,13 @@ pub trait FlashRegisters {
     fn watch_supply(&mut self, level: u8);
     /// True if the supply is below the level of [`Self::watch_supply`] now.
     fn supply_is_low(&self) -> bool;
-    /// Feeds the watchdog.
+    /// Feeds the watchdog: before and after the erase of a sector.
     fn feed_watchdog(&mut self);
     /// A microsecond counter that wraps.
     fn micros(&self) -> u32;
 }
 
-/// Why a flash operation failed.
+/// Why an operation of [`Flash`] failed. A read fails only with [`Error::Range`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(target_os = "none", derive(defmt::Format))]
 pub enum Error {

@@ -37,7 +37,6 @@ pub(crate) struct MainLoop<'a> {
 }
 
 impl MainLoop<'_> {
-    /// Runs the controller forever.
     pub(crate) fn run(mut self, mut arm: Controller) -> ! {
         loop {
             let now = self.clock.now();

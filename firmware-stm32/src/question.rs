@@ -18,7 +18,7 @@ const FIRST_ABSENT_ID: u8 = 8;
 const ABSENT_IDS: u16 = 246;
 
 impl Question {
-    /// A ping.
+    /// A ping, whose answer has no parameters.
     #[must_use]
     pub fn ping(id: u8) -> Self {
         Self::new(id, 0, |frame| frame::ping(frame, id))

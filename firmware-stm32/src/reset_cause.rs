@@ -17,7 +17,7 @@ const WINDOW_WATCHDOG: u32 = 1 << 30;
 #[cfg_attr(target_os = "none", derive(defmt::Format))]
 #[repr(u32)]
 pub enum ResetCause {
-    /// A panic.
+    /// A panic; the log names its file and line.
     Panic = 0x7B07_DEAD,
     /// A hard fault; bus, memory and usage faults escalate to it.
     HardFault = 0x7B07_FA17,

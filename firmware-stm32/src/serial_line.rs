@@ -30,7 +30,7 @@ pub enum TransmitEvent {
     Complete,
 }
 
-/// The registers of a USART.
+/// The registers of a USART, behind a trait so that tests can put a model in their place.
 pub trait UsartRegisters {
     /// Reads USART_SR.
     fn status(&self) -> u16;

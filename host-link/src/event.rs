@@ -37,7 +37,7 @@ pub enum HostEvent {
     /// A good frame that answers no open read: a late reply, the reply to a read that the link sent for itself, or the echo of a
     /// write on a one-wire line. The echo of a read lacks the values of a reply, so it is [`HostEvent::Damaged`].
     Unmatched(Function, Snapshot),
-    /// A frame was damaged.
+    /// A frame was damaged. If it was the reply to a read, the link may repeat the read.
     Damaged(Defect),
     /// Nothing happens before this time, unless bytes come. At that time, pass the bytes that came to
     /// [`HostLink::bytes`](crate::HostLink::bytes), or an empty slice.

@@ -295,7 +295,6 @@ impl Markers {
     const NONE: Self = Self { sent: 0, due: Instant::FAR_FUTURE };
 }
 
-/// The content of a frame.
 enum Message {
     /// The reply to a read, or a report of map 2.2.
     Reply(Snapshot),

@@ -21,7 +21,6 @@ use crate::span::Span;
 /// they cover six seconds.
 const REMEMBERED: usize = 64;
 
-/// A read that was sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct SentRead {
     /// `None` once it was given up or answered, and for a marker.

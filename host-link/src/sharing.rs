@@ -7,7 +7,7 @@
 
 use crate::Snapshot;
 
-/// The first register.
+/// The first register of the server's block.
 pub const FIRST: u8 = 232;
 /// The register that a program writes commands to.
 const COMMAND: u8 = 239;

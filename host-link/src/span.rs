@@ -4,7 +4,6 @@ use std::fmt;
 
 use protocol_core::registers::Register;
 
-/// The number of addresses.
 const ADDRESSES: usize = 256;
 
 /// Consecutive registers.
@@ -34,7 +33,7 @@ impl Span {
     /// No register.
     pub const NONE: Self = Self { address: 0, count: 0 };
 
-    /// One register.
+    /// The register at `address`.
     #[must_use]
     pub const fn one(address: u8) -> Self {
         Self { address, count: 1 }
@@ -71,7 +70,7 @@ impl Span {
         self.address
     }
 
-    /// The number of registers.
+    /// The number of registers, 0 to 255.
     #[must_use]
     pub const fn count(self) -> u8 {
         self.count

@@ -28,7 +28,7 @@ pub struct BusStatistics {
     round_trips: Vec<u32>,
 }
 
-/// The figures of a period.
+/// The figures of a period. `host-sim --servos` logs them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Figures {
     /// Questions per control cycle of 10 ms.
@@ -39,7 +39,7 @@ pub struct Figures {
     pub median: Duration,
     /// The 99th percentile of this time.
     pub p99: Duration,
-    /// Number of answers.
+    /// Number of answers to questions. An echo of a question is none.
     pub answers: u64,
     /// Number of received bytes, including those outside answers.
     pub bytes: u64,

@@ -153,7 +153,7 @@ pub struct Options {
 }
 
 impl Options {
-    /// The log level.
+    /// The log level: warnings with `--quiet`, otherwise more with each `--verbose`.
     #[must_use]
     pub const fn level(&self) -> LevelFilter {
         match (self.quiet, self.verbose) {

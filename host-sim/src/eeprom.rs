@@ -20,7 +20,7 @@ pub enum Eeprom {
     Memory,
     /// In this file of the user's state directory.
     UsersOwn(&'static str),
-    /// In this file.
+    /// In the file of `--eeprom FILE`.
     File(PathBuf),
 }
 
@@ -53,7 +53,7 @@ pub enum ImageError {
     /// The path is not a file of 32 KiB.
     #[error("{} is no settings image ({found}, not a file of {SIZE} bytes): delete it, or name another with --eeprom FILE", path.display())]
     NotAnImage {
-        /// The path.
+        /// The path that was opened.
         path: PathBuf,
         /// The length of the file, or that it is no regular file.
         found: String,
@@ -64,9 +64,9 @@ pub enum ImageError {
     /// The operating system refused.
     #[error("cannot {verb} settings image {}: {cause}: choose another with --eeprom FILE, or use --eeprom none", path.display())]
     Refused {
-        /// The operation.
+        /// What the program could not do: `open`, `lock` and others, as in the message.
         verb: &'static str,
-        /// The path.
+        /// The path of the image.
         path: PathBuf,
         /// The system's reason.
         cause: io::Error,

@@ -34,7 +34,7 @@ const CLIENTS: u64 = u64::MAX - 1;
 /// The event data of the control socket of the first arm. The numbers of the other control sockets follow.
 const CONTROL: u64 = 1 << 32;
 
-/// The arms of a process.
+/// The arms of a process, with their ports and control sockets.
 #[derive(Debug)]
 pub struct EventLoop<F, C = Controller> {
     arms: Vec<ArmEntry<F, C>>,

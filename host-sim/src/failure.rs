@@ -11,7 +11,6 @@ use host_sim::session_file::SessionFileError;
 use tty_ports::serial::SerialError;
 use tty_ports::symlink::SymlinkError;
 
-/// Why the program failed.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum Failure {
     #[error(transparent)]

@@ -16,25 +16,25 @@ pub enum SocketError {
     /// The path exists and is not a socket.
     #[error("--{option} {}: that is no socket, so it is not replaced: remove it, or choose another path", path.display())]
     Taken {
-        /// The option with the path.
+        /// The option that gave the path, without `--`.
         option: &'static str,
-        /// The path.
+        /// The path of what is no socket.
         path: PathBuf,
     },
     /// Another process listens at the path.
     #[error("--{option} {}: another simulator listens there: end that one, or choose another path", path.display())]
     InUse {
-        /// The option with the path.
+        /// The option that gave the path, without `--`.
         option: &'static str,
-        /// The path.
+        /// The path of the socket in use.
         path: PathBuf,
     },
     /// The operating system refused.
     #[error("--{option} {}: {cause}: choose a short path in a directory that exists and that you can write to", path.display())]
     Refused {
-        /// The option with the path.
+        /// The option that gave the path, without `--`.
         option: &'static str,
-        /// The path.
+        /// The path that the socket was to have.
         path: PathBuf,
         /// The system's reason.
         cause: io::Error,
@@ -91,7 +91,7 @@ impl PrivateSocket {
         }
     }
 
-    /// The path of the socket.
+    /// The path that was passed to [`PrivateSocket::listen`].
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path

@@ -25,7 +25,7 @@ use tty_ports::pty::Pty;
 /// The most kept reports of faults that ended by themselves.
 const ENDED_FAULTS: usize = 16;
 
-/// An arm on a pseudo-terminal.
+/// An arm, its pseudo-terminal, and the kept copies of the arm.
 #[derive(Debug)]
 pub struct PtyArm<F, B = Plant, C = Controller> {
     simulation: SimulatedArm<F, B, C>,
@@ -42,7 +42,6 @@ pub struct PtyArm<F, B = Plant, C = Controller> {
     snapshots: Snapshots<ArmSnapshot<F, B, C>>,
 }
 
-/// A copy of an arm.
 #[derive(Debug)]
 struct ArmSnapshot<F, B, C> {
     simulation: SimulatedArm<F, B, C>,
@@ -125,7 +124,7 @@ impl<F: NorFlash + Clone, C: ArmController> PtyArm<F, Plant, C> {
         Ok(self.simulation.now())
     }
 
-    /// The path of the port.
+    /// The path of the pseudo-terminal, which clients open.
     #[must_use]
     pub fn port(&self) -> &Path {
         self.pty.path()
@@ -238,7 +237,7 @@ impl<F: NorFlash + Clone, B: ServoBus, C: ArmController> PtyArm<F, B, C> {
         self.pty.has_news(clients)
     }
 
-    /// The servo bus.
+    /// The servo bus, for example to pass it the bytes of real servos.
     pub const fn bus(&mut self) -> &mut B {
         self.simulation.bus()
     }

@@ -48,7 +48,7 @@ const ALL_MISSING: u8 = 0x7F;
 /// The port and the settings of the servo bus.
 #[derive(Clone, Debug)]
 pub struct BusConfig {
-    /// The adapter's port.
+    /// The serial port of the USB adapter.
     pub port: PathBuf,
     /// The baud rate of the servo bus.
     pub baud: u32,

@@ -23,7 +23,7 @@ pub enum SessionFileError {
     File {
         /// The operation that failed: `read` or `write`.
         verb: &'static str,
-        /// The file.
+        /// The file that was to be read or written.
         path: PathBuf,
         /// The system's reason.
         cause: io::Error,
@@ -34,19 +34,19 @@ pub enum SessionFileError {
     /// The file is not a session.
     #[error("{}: {reason}", path.display())]
     NoSession {
-        /// The file.
+        /// The file that was to be replayed.
         path: PathBuf,
-        /// What is wrong.
+        /// Why it is no session.
         reason: ReplayError,
     },
     /// The arm sent other bytes than in the file.
     #[error("{}, line {line}: {difference}{}", path.display(), in_words(frame))]
     Different {
-        /// The file.
+        /// The file that was replayed.
         path: PathBuf,
         /// The number of the line; the first is 1.
         line: usize,
-        /// What differs.
+        /// The bytes of the file and of the replaying arm, and when the host took them.
         difference: Difference,
         /// The frame of the session that differs, in words.
         frame: Option<String>,

@@ -21,7 +21,7 @@ pub enum SnapshotError {
     /// There is no snapshot with this name.
     #[error("there is no snapshot '{name}'{}", listed(others))]
     Unknown {
-        /// The name.
+        /// The name that was asked for.
         name: String,
         /// The names of the snapshots that exist.
         others: Vec<String>,

@@ -25,10 +25,10 @@ pub trait Float:
     /// Is this neither infinite nor NaN?
     #[must_use]
     fn is_finite(self) -> bool;
-    /// The magnitude.
+    /// The magnitude; 0 for -0.
     #[must_use]
     fn abs(self) -> Self;
-    /// The square root.
+    /// The square root; NaN for a number below 0.
     #[must_use]
     fn sqrt(self) -> Self;
     /// The angle of the point (`x`, `self`) in radians, -pi to pi.

@@ -43,13 +43,13 @@ pub struct HandFrames<F> {
     pub disc_zero: Vector<F>,
     /// Direction of the disc at 90 degrees of joint 6.
     pub disc_right: Vector<F>,
-    /// Direction of the disc.
+    /// Direction of the disc at the angle of joint 6.
     pub disc: Vector<F>,
     /// Where the axis of joint 6 meets the outer face of the disc.
     pub tip: Vector<F>,
     /// Edge of the disc, in its direction.
     pub disc_edge: Vector<F>,
-    /// The opposite edge.
+    /// Edge of the disc, opposite to its direction.
     pub opposite_edge: Vector<F>,
 }
 

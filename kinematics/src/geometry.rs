@@ -60,7 +60,7 @@ pub const LEVEL_FOREARM: f64 = 65.0;
 pub const JOINT_MAX: f64 = 180.0;
 /// The smallest value of [`linkage`](crate::limits::linkage): the elbow is as far open as the parallelogram lets it be.
 pub const LINKAGE_MIN: f64 = 19.0;
-/// The largest value of [`linkage`](crate::limits::linkage).
+/// The largest value of [`linkage`](crate::limits::linkage): the elbow is as far closed as the parallelogram lets it be.
 pub const LINKAGE_MAX: f64 = 161.0;
 /// The largest angle of joint 7: its servo ends at 1023 counts.
 pub const CLAW_MAX: f64 = 84.0;

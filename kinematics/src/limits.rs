@@ -9,7 +9,7 @@ use crate::geometry::{CLAW_MAX, JOINT_MAX, LEVEL_FOREARM, LINKAGE_MAX, LINKAGE_M
 /// moves the tip by 0.003 mm; one count of a servo is more than 0.2 degrees.
 pub const TOLERANCE: f64 = 0.0005;
 
-/// A limit that angles break.
+/// A limit that angles break. The checks return the first one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LimitBroken {
     /// The joint of this number, 1 to 6, is outside 0 to 180 degrees.

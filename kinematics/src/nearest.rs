@@ -21,7 +21,6 @@ use crate::inverse::{NO_HEADING, ik5, ik6};
 use crate::limits::joint_angle;
 use crate::vector::Vector;
 
-/// The centre of an arc.
 #[derive(Clone, Copy)]
 enum Centre {
     Elbow,

@@ -18,19 +18,19 @@ pub struct Vector<F> {
 }
 
 impl<F: Float> Vector<F> {
-    /// A vector from its components.
+    /// A vector: `x` to the right, `y` forward, `z` up.
     #[must_use]
     pub const fn new(x: F, y: F, z: F) -> Self {
         Self { x, y, z }
     }
 
-    /// The dot product.
+    /// The dot product; 0 at right angles.
     #[must_use]
     pub fn dot(self, other: Self) -> F {
         self.x * other.x + self.y * other.y + self.z * other.z
     }
 
-    /// The cross product.
+    /// The cross product, at right angles to both vectors.
     #[must_use]
     pub fn cross(self, other: Self) -> Self {
         Self::new(
@@ -58,7 +58,7 @@ impl<F: Float> Vector<F> {
         Some(scaled * (F::of(1.0) / scaled.length()))
     }
 
-    /// Are all components finite?
+    /// Is no component infinite or NaN?
     #[must_use]
     pub fn is_finite(self) -> bool {
         self.x.is_finite() && self.y.is_finite() && self.z.is_finite()

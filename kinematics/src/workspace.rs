@@ -71,9 +71,9 @@ pub enum Obstacle {
 /// The part of the arm that is nearest to an obstacle, or deepest in it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Clearance {
-    /// The part.
+    /// The part of which `mm` is the distance.
     pub part: Part,
-    /// The obstacle.
+    /// The obstacle from which `mm` is measured.
     pub obstacle: Obstacle,
     /// The distance between part and obstacle in mm; negative inside the obstacle. The distance from the base is the larger
     /// one of the distances from its side and from its top.

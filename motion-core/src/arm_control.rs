@@ -221,7 +221,6 @@ impl ArmControl {
         Some(changed_setting.is_some())
     }
 
-    /// Executes a checked write.
     fn execute(&mut self, now: Instant, accepted: &Accepted<'_>, changes_settings: bool) {
         // The motor state comes before the rest of the frame, so that a target in it replaces the measured position (D13).
         self.set_motor_state(accepted);
@@ -315,7 +314,6 @@ impl ArmControl {
         self.watchdog.heard(now);
     }
 
-    /// Counts an accepted request.
     pub(crate) fn count_accepted(&mut self) {
         self.registers.increment(&FRAMES_ACCEPTED);
     }

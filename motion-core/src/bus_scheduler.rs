@@ -68,17 +68,14 @@ impl BusScheduler {
         self.bus.bytes(now, bytes);
     }
 
-    /// See [`Bus::damaged_byte`].
     pub(crate) fn servo_byte_damaged(&mut self, now: Instant) {
         self.bus.damaged_byte(now);
     }
 
-    /// See [`Bus::set_answer_delay`].
     pub(crate) const fn set_answer_delay(&mut self, delay: Duration) {
         self.bus.set_answer_delay(delay);
     }
 
-    /// See [`Bus::take_longest_answers`].
     pub(crate) const fn take_longest_answers(&mut self) -> [u16; JOINTS] {
         self.bus.take_longest_answers()
     }
@@ -93,7 +90,6 @@ impl BusScheduler {
         self.bus.poll(now)
     }
 
-    /// Is this start-up?
     pub(crate) const fn is_starting(&self) -> bool {
         self.starting_until.is_some()
     }

@@ -39,7 +39,7 @@ pub enum Output<'a> {
     Wait(Instant),
 }
 
-/// The controller of one arm.
+/// The logic of one arm's controller. A shell passes bytes and time to it, and executes each [`Output`].
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Controller {

@@ -49,7 +49,7 @@ pub enum Target {
     FromHost,
 }
 
-/// The drive of one joint.
+/// Whether one joint is released, engaging, engaged or silent, and the trajectory of its set-point.
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Drive {
@@ -67,7 +67,7 @@ impl Drive {
         self.engagement = Engagement::Waiting { has_target: false };
     }
 
-    /// Stops driving the joint.
+    /// Stops driving the joint, from every state, and forgets its set-point and its target.
     pub fn release(&mut self) {
         *self = Self::RELEASED;
     }
@@ -200,12 +200,12 @@ impl Drive {
         }
     }
 
-    /// See [`Trajectory::hold_back`].
+    /// Takes back the part of the last step beyond `set_point`: see [`Trajectory::hold_back`].
     pub fn hold_back(&mut self, set_point: MicroDegrees) {
         self.trajectory.hold_back(set_point);
     }
 
-    /// See [`Trajectory::catch_up`].
+    /// Moves the set-point towards its target at once, as far as `angle`: see [`Trajectory::catch_up`].
     pub fn catch_up(&mut self, angle: MicroDegrees) {
         self.trajectory.catch_up(angle);
     }

@@ -141,14 +141,12 @@ impl HostPort {
         None
     }
 
-    /// Encodes the reply to `read`.
     pub(crate) fn reply(&mut self, read: Read, registers: &RegisterFile) -> &[u8] {
         let values = registers.read(read.address, read.count);
         Reply { address: read.address, values }.encode(&mut self.frame);
         &self.frame
     }
 
-    /// Encodes a report.
     pub(crate) fn report(&mut self, kind: ReportKind, registers: &RegisterFile) -> &[u8] {
         let (address, count) = kind.registers();
         let values = registers.read(address, count);
@@ -159,7 +157,6 @@ impl HostPort {
         &self.frame
     }
 
-    /// Encodes an alarm.
     pub(crate) fn alarm(&mut self, alarm: Alarm) -> &[u8] {
         alarm.encode(&mut self.frame);
         &self.frame

@@ -42,7 +42,6 @@ enum Protected {
     TurnedPast,
 }
 
-/// The state of one joint.
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct JointState {

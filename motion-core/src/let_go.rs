@@ -83,7 +83,6 @@ impl LetGo {
     pub(crate) const NO: Self =
         Self { state: State::Holding, attempts: [None; ATTEMPTS], is_exhausted: false, is_ordered: false };
 
-    /// Is the joint let go?
     pub(crate) const fn is_let_go(&self) -> bool {
         matches!(self.state, State::LetGo { .. })
     }

@@ -25,7 +25,6 @@ pub(crate) struct HeldBack {
     pub(crate) ends_move: bool,
 }
 
-/// The obstacle of one joint.
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Obstacle {
@@ -40,7 +39,6 @@ pub(crate) struct Obstacle {
 }
 
 impl Obstacle {
-    /// Nothing is in the way.
     pub(crate) const NONE: Self =
         Self { limiter: PushLimiter::FREE, held: None, is_blocked: false, retrying_since: None };
 

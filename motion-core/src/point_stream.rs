@@ -23,7 +23,6 @@ const SHIFT_DIVISOR: u64 = 16;
 /// If a frame comes later than 1/8 of a period after the newest point was due, the frame before it counts as lost.
 const LATE_DIVISOR: u64 = 8;
 
-/// A point of a stream.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Point {
@@ -42,7 +41,7 @@ pub struct PointStream {
 }
 
 impl PointStream {
-    /// No stream.
+    /// No points and no grid: the next point begins a new stream.
     pub const NONE: Self = Self { points: Vec::new(), last_due: Instant::ZERO };
 
     /// Forgets the points and their grid: the next point begins a new stream.

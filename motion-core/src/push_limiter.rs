@@ -184,7 +184,7 @@ impl PushLimiter {
         ahead.then_some(bound.set_point)
     }
 
-    /// Is the joint limited?
+    /// Is there a bound for the set-point now, whether or not it holds the set-point back?
     #[must_use]
     pub const fn is_limiting(&self) -> bool {
         matches!(self.phase, Phase::Limiting(_))

@@ -25,7 +25,7 @@ pub struct ReportTimer {
 }
 
 impl ReportTimer {
-    /// The timer without reports.
+    /// Never due, until a frequency is set.
     pub const OFF: Self = Self { frequency: 0, due: Instant::FAR_FUTURE, remainder: 0 };
 
     /// Sets the frequency in Hz, as a frequency register holds it, limited to `highest`. The first report is due one

@@ -14,7 +14,6 @@ use protocol_core::time::Instant;
 
 use crate::report_timer::{ReportTimer, highest_frequency};
 
-/// The streams that run.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Reports {
@@ -28,7 +27,6 @@ pub(crate) struct Reports {
 }
 
 impl Reports {
-    /// No stream.
     pub(crate) const OFF: Self = Self {
         kind: ReportKind::Positions,
         joints: ReportTimer::OFF,

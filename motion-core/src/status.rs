@@ -9,7 +9,6 @@ use protocol_core::settings::Storage;
 
 use crate::joints::Joints;
 
-/// Bits of all seven joints.
 const ALL_JOINTS: u8 = 0x7F;
 
 /// The part of the status block that does not come from the joints.
@@ -65,7 +64,6 @@ impl Status {
         self.show_faults(registers, joints);
     }
 
-    /// Shows the fault bits.
     pub(crate) fn show_faults(&self, registers: &mut RegisterFile, joints: &Joints) {
         let storage = if self.storage == Storage::Ready { 0 } else { fault::SETTINGS_STORAGE };
         let is_faulty = registers.get(MISSING_SERVOS.address) != 0 || joints.any_alarm();

@@ -28,7 +28,6 @@ enum Known {
 /// What an answer says of a torque switch that should be on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum TorqueFound {
-    /// Nothing new.
     AsBefore,
     /// The order to switch torque on was lost.
     OrderLost,
@@ -98,7 +97,6 @@ impl TorqueCheck {
         self.is_fresh
     }
 
-    /// Records that torque is refreshed.
     pub(crate) const fn refreshed(&mut self) {
         self.is_fresh = false;
     }

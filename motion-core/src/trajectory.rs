@@ -38,7 +38,7 @@ impl Trajectory {
         Self { set_point: angle, target: angle, cycles_left: 0, stream: PointStream::NONE }
     }
 
-    /// The present set-point.
+    /// Where the joint has to be now, on its way to the target.
     #[must_use]
     pub const fn set_point(&self) -> MicroDegrees {
         self.set_point

@@ -10,7 +10,7 @@ const RELEASE_TIME: Duration = Duration::from_millis(500);
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Vacuum {
-    /// The pump runs.
+    /// The pump runs, never while the valve is open.
     pub pump: bool,
     /// The valve is open: air enters and the cup releases.
     pub valve: bool,

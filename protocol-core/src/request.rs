@@ -11,7 +11,7 @@
 
 use crate::wire::frame::{self, Frame, FrameBuffer, Function};
 
-/// A request of the host.
+/// What one frame from the host asks for. The values are borrowed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Request<'a> {

@@ -39,22 +39,22 @@ impl Instant {
 }
 
 impl Duration {
-    /// Zero duration.
+    /// No time; also the time since an instant that is still ahead.
     pub const ZERO: Self = Self(0);
 
-    /// A duration of `micros` microseconds.
+    /// From microseconds, the resolution of a duration.
     #[must_use]
     pub const fn from_micros(micros: u64) -> Self {
         Self(micros)
     }
 
-    /// A duration of `millis` milliseconds.
+    /// From milliseconds. The product saturates at `u64::MAX` microseconds.
     #[must_use]
     pub const fn from_millis(millis: u64) -> Self {
         Self(millis.saturating_mul(1_000))
     }
 
-    /// The duration in microseconds.
+    /// The duration in microseconds, without rounding.
     #[must_use]
     pub const fn as_micros(self) -> u64 {
         self.0

@@ -24,7 +24,6 @@ use crate::worker::lock;
 
 /// The allowed loads at the tip, in grams.
 const GRAMS: std::ops::RangeInclusive<f64> = 0.0..=HEAVIEST_LOAD_G as f64;
-/// The most arms.
 const MOST_ARMS: i64 = 1_000_000;
 /// The approximate memory of an arm, in bytes.
 const ARM_BYTES: usize = 20_000;

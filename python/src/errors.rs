@@ -102,7 +102,7 @@ impl Closed {
     }
 }
 
-/// An exception with its hints.
+/// An exception with the hints below its message, and in its attribute `hints`.
 pub(crate) fn error<E: PyTypeInfo>(py: Python<'_>, message: &str, hints: &[String]) -> PyErr {
     let lines = hints.iter().fold(message.to_owned(), |text, hint| format!("{text}\n  - {hint}"));
     let error = PyErr::from_type(E::type_object(py), (lines,));

@@ -81,7 +81,6 @@ impl LatestSlot {
         Some(Ok(Told { counts: slot.counts(), pose: slot.pose }))
     }
 
-    /// Takes the action that waits.
     pub(crate) fn take(&self) -> Option<FineTargets> {
         self.slot().action.take()
     }

@@ -8,7 +8,6 @@ use pyo3::types::{PyByteArray, PyBytes, PyDict, PyFrozenSet, PySet, PyString};
 
 use crate::errors::{InvalidType, InvalidValue};
 
-/// Seven angles.
 pub(crate) type Angles = (f64, f64, f64, f64, f64, f64, f64);
 
 /// The most rows that are read: many more than a recording has.
@@ -97,7 +96,6 @@ impl<'py> FromPyObject<'_, 'py> for Numbers {
     }
 }
 
-/// Rows of seven numbers.
 pub(crate) struct Rows(pub(crate) Vec<[f64; 7]>);
 
 impl<'py> FromPyObject<'_, 'py> for Rows {

@@ -65,7 +65,6 @@ impl Answer {
     }
 }
 
-/// `time.monotonic()`.
 pub(crate) fn monotonic(py: Python<'_>) -> PyResult<f64> {
     py.import("time")?.call_method0("monotonic")?.extract()
 }

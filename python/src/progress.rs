@@ -6,7 +6,6 @@ use indicatif::{ProgressBar, ProgressDrawTarget};
 
 /// Calls of [`ProgressLine::show`] until the bar appears, so that short calls show nothing.
 const DELAY_CALLS: u32 = 10;
-/// Redraws per second.
 const REDRAW_HZ: u8 = 10;
 
 /// A progress bar on the standard error, if that is a terminal.

@@ -21,7 +21,7 @@ pub enum Format {
 }
 
 impl Format {
-    /// All formats.
+    /// All formats, the text format first.
     pub const ALL: [Self; 3] = [Self::Text, Self::Csv, Self::Mcap];
 
     /// Its file name extension, without the dot.

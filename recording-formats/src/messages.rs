@@ -31,7 +31,7 @@ macro_rules! header {
 
 /// A message of a topic.
 pub(crate) trait RosMessage: Serialize {
-    /// The name of the interface.
+    /// The name of the interface with its package: `std_msgs/msg/Bool`.
     const NAME: &'static str;
     /// The definition of the interface, followed by the definitions of the interfaces that it uses.
     const DEFINITION: &'static str;

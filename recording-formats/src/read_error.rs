@@ -44,16 +44,16 @@ pub enum McapReadError {
         "no message of a topic `joint_states` or `robot_joint_states` has the positions of joint_1 to joint_7"
     )]
     NoJoints,
-    /// Several arms were recorded.
+    /// Several topics of the same name, in different namespaces, have the states of the joints. Holds the topics.
     #[error("this has the joints of several arms: {}", .0.join(", "))]
     SeveralArms(Vec<String>),
-    /// The chunks are compressed.
+    /// The chunks are compressed with this method. Only uncompressed chunks are read.
     #[error("its chunks are compressed with {0}: only uncompressed files are read")]
     Compressed(String),
     /// A joint is beyond its range.
     #[error("at {seconds:.3} s joint {} is at {degrees:.2} degrees, and the range is 0 to 180", joint.number())]
     OutOfRange {
-        /// The joint.
+        /// The first joint beyond its range at that time.
         joint: Joint,
         /// Its angle in degrees of the registers.
         degrees: f64,

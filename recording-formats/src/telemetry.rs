@@ -7,7 +7,7 @@ use sevenbot::FineAngle;
 pub struct Telemetry {
     /// The target positions, joint 1 first.
     pub targets: Option<[FineAngle; 7]>,
-    /// The velocities and loads.
+    /// The velocities and loads: both or none.
     pub motion: Option<JointMotion>,
 }
 

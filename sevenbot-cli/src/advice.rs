@@ -4,7 +4,6 @@ use sevenbot::ReceiveCounts;
 pub(crate) use sevenbot::advice::{exchange, opening};
 use sevenbot::servo_bench::ServoError;
 
-/// How to start a simulator.
 pub(crate) const START_SIMULATOR: &str = "`host-sim --link ./7bot` starts a simulated arm that stays, for --port ./7bot; in the source \
                                           tree: `cargo sim -- --link ./7bot`";
 

@@ -27,7 +27,6 @@ const SAFETY: [&str; 3] = [
     "then send a stop: `sevenbot stop`",
 ];
 
-/// Why a command fails.
 #[derive(Debug)]
 pub(crate) enum CommandError {
     /// The arm did not carry out the request.
@@ -61,14 +60,12 @@ pub(crate) enum CommandError {
     /// No simulator has a control socket for the request.
     #[cfg(unix)]
     NoSimulator { message: String, advice: Vec<String> },
-    /// The simulator refused the request.
     #[cfg(unix)]
     SimulatorRefused { message: String, hint: String },
     /// A file cannot be read or written, or has the wrong content.
     File { path: PathBuf, reason: String },
     /// The output cannot be written.
     Output(io::Error),
-    /// The user interrupted the command.
     Interrupted,
 }
 
@@ -158,7 +155,6 @@ impl From<io::Error> for CommandError {
 }
 
 impl CommandError {
-    /// A failure with a file.
     pub(crate) fn file(path: &Path, reason: impl ToString) -> Self {
         Self::File { path: path.to_owned(), reason: reason.to_string() }
     }

@@ -15,12 +15,9 @@ use crate::svg;
 /// Seconds and degrees.
 pub(crate) type PlotPoint = (f64, f64);
 
-/// The curves of one joint.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct JointTrack {
-    /// The target over time.
     pub(crate) target: Vec<PlotPoint>,
-    /// The measured position over time.
     pub(crate) measured: Vec<PlotPoint>,
 }
 
@@ -43,7 +40,6 @@ text { font: 12px sans-serif; fill: #444 } .title { font-size: 15px; fill: #111 
 .middle { text-anchor: middle } polyline { fill: none; stroke-linejoin: round }
 .target { stroke: #f2b56b; stroke-width: 5 } .measured { stroke: #1b5e9e; stroke-width: 1.5 }";
 
-/// The plot of seven joints.
 pub(crate) fn drawing(title: &str, tracks: &[JointTrack; 7]) -> String {
     let seconds = AxisScale::of_time(tracks);
     let height = TOP + 7.0 * (PANEL + GAP) - GAP + BOTTOM;

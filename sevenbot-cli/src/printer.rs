@@ -24,11 +24,9 @@ static IS_JSON: AtomicBool = AtomicBool::new(false);
 
 /// The result of a command, as JSON (by serde) or as text.
 pub(crate) trait Printable: Serialize {
-    /// Writes the text.
     fn write_text(&self, out: &mut dyn Write) -> io::Result<()>;
 }
 
-/// Prints results.
 pub(crate) struct Printer {
     json: bool,
     stream: Box<dyn Write>,
@@ -40,7 +38,6 @@ impl Printer {
         Self { json, stream: Box::new(anstream::stdout()) }
     }
 
-    /// Is the output JSON?
     pub(crate) const fn is_json(&self) -> bool {
         self.json
     }
@@ -73,7 +70,6 @@ pub(crate) fn note(message: impl Display) {
     tell("note", BOLD, &message);
 }
 
-/// Prints a warning.
 pub(crate) fn warn(message: impl Display) {
     tell("warning", WARNING, &message);
 }

@@ -12,7 +12,6 @@ use sevenbot::names::{NameError, name_of};
 #[derive(Clone, Copy)]
 pub(crate) struct RegisterParser<T>(pub(crate) fn(&str) -> Result<T, NameError>);
 
-/// The names of all rows.
 static NAMES: LazyLock<Vec<String>> = LazyLock::new(|| MAP.iter().map(name_of).collect());
 
 impl<T: Clone + Send + Sync + 'static> TypedValueParser for RegisterParser<T> {

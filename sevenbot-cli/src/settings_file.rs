@@ -37,7 +37,6 @@ const REMEDY: &str = "correct the line or delete it, or write a new file with `s
 /// The length limit of a settings file, in bytes. Real files are much shorter.
 const LONGEST: u64 = 1_000_000;
 
-/// The content of the file.
 #[derive(Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct SettingsFile {
@@ -65,7 +64,6 @@ impl SettingsFile {
         Self { format: FORMAT, chip_id: identity.chip_name(), firmware: identity.version(), settings }
     }
 
-    /// The text of the file.
     pub(crate) fn text(&self) -> io::Result<String> {
         let body = toml::to_string(self).map_err(io::Error::other)?;
         Ok(format!(

@@ -15,7 +15,6 @@ use sevenbot::cartesian::Vector;
 
 use crate::svg;
 
-/// A point of the way.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct WayPoint {
     /// The tip, in millimetres.
@@ -56,7 +55,6 @@ const VIEWS: [SpaceView; 3] = [
     SpaceView { heading: "from the right", axes: ["y", "z"], flat: |point| [point.y, point.z] },
 ];
 
-/// The plot of a way.
 pub(crate) fn drawing(title: &str, way: &[WayPoint]) -> String {
     let (width, height) = (3.0 * (PANEL + GAP) + GAP / 2.0, TOP + PANEL + BOTTOM);
     let mut out = svg::sheet(width, height, STYLE);

@@ -2,11 +2,10 @@
 
 use anstyle::{AnsiColor, Style};
 
-/// Headings.
+/// Headings, and the word `note`.
 pub(crate) const BOLD: Style = Style::new().bold();
-/// Good states.
 pub(crate) const GOOD: Style = AnsiColor::Green.on_default();
 /// Faults and errors.
 pub(crate) const BAD: Style = AnsiColor::Red.on_default().bold();
-/// Warnings.
+/// Warnings, and acceptable offsets.
 pub(crate) const WARNING: Style = AnsiColor::Yellow.on_default().bold();

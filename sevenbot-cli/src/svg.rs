@@ -10,7 +10,6 @@ pub(crate) fn sheet(width: f64, height: f64, style: &str) -> String {
     )
 }
 
-/// The finished drawing.
 pub(crate) fn end(drawing: String) -> String {
     drawing + "</svg>\n"
 }
@@ -24,7 +23,6 @@ pub(crate) fn line(out: &mut String, class: &str, points: impl IntoIterator<Item
     let _ = writeln!(out, "<polyline class=\"{class}\" points=\"{}\"/>", points.join(" "));
 }
 
-/// Escapes text for SVG.
 pub(crate) fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }

@@ -37,7 +37,7 @@ impl FrameClient {
         Self { id, deframer: Deframer::new(gap(baud)), output: Vec::new(), drops_reads: false }
     }
 
-    /// The id in the hub.
+    /// The client in calls of the [`Hub`].
     #[must_use]
     pub const fn id(&self) -> ClientId {
         self.id
@@ -99,7 +99,7 @@ impl FrameClient {
         hub.set_can_receive(self.id, self.output.len() + MAX_LENGTH <= MOST_BYTES);
     }
 
-    /// Bytes for the client.
+    /// The frames that the client has not taken yet: see [`FrameClient::consume`].
     #[must_use]
     pub fn output(&self) -> &[u8] {
         &self.output

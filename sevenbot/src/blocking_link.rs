@@ -92,7 +92,6 @@ impl BlockingLink {
         Ok(!bytes.is_empty())
     }
 
-    /// The clock of the line.
     pub(crate) fn now(&self) -> Instant {
         self.line.now()
     }

@@ -19,7 +19,8 @@ use host_link::Span;
 /// ```
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum OpenError {
-    /// There is no such port.
+    /// There is no serial port or socket of this name, and no server with it is known. On Windows a serial port that is missing is
+    /// [`Self::Unusable`].
     #[error("there is no such port")]
     NotFound,
     /// This user may not open the port.
@@ -40,7 +41,7 @@ pub enum OpenError {
     /// The device is not a 7Bot V2: its device code is not 7.
     #[error("the device on this port is not a 7Bot V2: its device code is {code}, not 7")]
     WrongDevice {
-        /// The device code.
+        /// The value of register 0.
         code: u8,
     },
 }
@@ -67,7 +68,7 @@ pub enum Error {
     OutsideMap {
         /// The first register.
         address: u8,
-        /// The number of registers.
+        /// The number of registers to read or to write.
         count: usize,
     },
     /// A read was not answered in any attempt.
@@ -75,14 +76,14 @@ pub enum Error {
     NoAnswer {
         /// The registers of the read.
         span: Span,
-        /// The number of attempts.
+        /// The number of attempts, at least 1.
         attempts: u32,
         /// The timeout of each attempt. The read failed after `attempts` times this.
         waited: Duration,
         /// What was received instead.
         received: ReceiveCounts,
     },
-    /// The port failed.
+    /// The port takes no more bytes, or the connection is gone.
     #[error(transparent)]
     Port(#[from] PortError),
 }

@@ -55,7 +55,7 @@ impl FineAngle {
         self.0
     }
 
-    /// The angle in degrees.
+    /// The angle in degrees, 0 to 180.
     #[must_use]
     pub fn degrees(self) -> f64 {
         f64::from(self.0) / f64::from(PER_DEGREE)
@@ -68,7 +68,7 @@ impl FineAngle {
         Angle::from_register(u8::try_from(degrees).unwrap_or(Angle::MAX_DEGREES))
     }
 
-    /// Is it a whole degree?
+    /// Is it a whole number of degrees, which every firmware takes as a target?
     #[must_use]
     pub const fn is_whole(self) -> bool {
         self.0.is_multiple_of(PER_DEGREE)

@@ -22,7 +22,7 @@ pub trait HostLine: fmt::Debug + Send {
     /// The line failed.
     fn receive(&mut self, timeout: Duration) -> Result<Vec<u8>, PortError>;
 
-    /// The time now.
+    /// The time on the clock of the line, by default the clock of the system.
     fn now(&self) -> Instant {
         Instant::now()
     }

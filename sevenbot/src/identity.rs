@@ -60,7 +60,7 @@ impl Identity {
         format!("{}.{}", tenths / 10, tenths % 10)
     }
 
-    /// Which firmware the arm runs.
+    /// Whose firmware the arm runs, by the version in register 1.
     #[must_use]
     pub fn firmware(&self) -> Firmware {
         match self.0.byte(&FIRMWARE_VERSION) {

@@ -38,7 +38,7 @@ const AT_TARGET_DEGREES: u8 = 5;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum StepBaseError {
-    /// Its servo does not answer.
+    /// Its servo does not answer, so its position is unknown.
     #[error("its servo does not answer")]
     Silent,
     /// Its target may be the default of power-up, and the joint is elsewhere.

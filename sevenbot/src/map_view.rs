@@ -219,7 +219,7 @@ mod tests {
 
     /// An arm of the maker with map 2.1.
     const MAP_21: MapView = MapView { map: Map::V21, firmware: Firmware::Makers };
-    /// This project's firmware.
+    /// This project's firmware, which serves both maps.
     const BOTH: MapView = MapView { map: Map::V22, firmware: Firmware::Ours };
     /// An arm of the maker with map 2.2.
     const MAP_22: MapView = MapView { map: Map::V22, firmware: Firmware::Makers };

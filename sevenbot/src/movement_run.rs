@@ -39,7 +39,7 @@ pub enum RunStep {
     Step(Step),
     /// Nothing is due before this time.
     Wait(Duration),
-    /// The run is over.
+    /// The run is over, a short time after its last point or step.
     Over,
     /// The run is over before its end: the program paused for this time, and the arm has stopped.
     Paused(Duration),
@@ -58,7 +58,6 @@ impl RunStep {
     }
 }
 
-/// What a run sends.
 #[derive(Clone, Debug)]
 enum Content {
     Way(Approach),

@@ -21,7 +21,7 @@ const UNLOCK_TIMEOUT: Duration = Duration::from_secs(1);
 /// Time between two attempts to open a locked port.
 const TRY_AGAIN: Duration = Duration::from_millis(20);
 
-/// An open serial port.
+/// An open serial port, which no other program can open meanwhile.
 pub struct OpenPort {
     port: Box<dyn SerialPort>,
 }

@@ -101,7 +101,6 @@ pub fn approach(from: [Angle; 7], to: Moment) -> Step {
     Step { time: Duration::ZERO, vacuum: to.vacuum, speeds, targets: to.pose }
 }
 
-/// A moment in whole degrees.
 #[derive(Clone, Copy, Debug)]
 struct WholeMoment {
     time: Duration,

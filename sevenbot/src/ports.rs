@@ -44,7 +44,7 @@ pub struct PortInfo {
 /// ```
 #[derive(Debug)]
 pub struct ProbeResult {
-    /// The port.
+    /// The serial port, or the server, that was asked.
     pub port: PortInfo,
     /// The arm's identity and device id (register 11), or why there is none.
     pub answer: Result<(Identity, u8), OpenError>,

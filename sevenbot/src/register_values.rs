@@ -12,9 +12,9 @@ pub enum ValueError {
     /// There is neither one number for all registers nor one for each.
     #[error("{given} values for {registers} registers: one each, or one for all")]
     Count {
-        /// The number of values.
+        /// The number of values, which is neither 1 nor `registers`.
         given: usize,
-        /// The number of registers.
+        /// The number of registers. For [`bytes()`] one of two bytes counts once.
         registers: usize,
     },
     /// The span holds half of a two-byte register ([D22](protocol_core::decisions#d22)).
@@ -28,9 +28,9 @@ pub enum ValueError {
     /// The number is out of the register's range.
     #[error("{value} is out of range: {} takes {}", name_of_register(*address), range(*address))]
     OutOfRange {
-        /// The register.
+        /// The address of the register; of a two-byte register, its low byte.
         address: u8,
-        /// The number.
+        /// The number that was given, in the table's unit.
         value: i32,
     },
     /// The number is not a byte, and the table has no range for the register.

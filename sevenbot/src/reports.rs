@@ -94,7 +94,6 @@ impl ReportQueue {
         self.0.pop_front()
     }
 
-    /// Takes all reports.
     pub(crate) fn drain(&mut self) -> impl Iterator<Item = Report> {
         self.0.drain(..)
     }

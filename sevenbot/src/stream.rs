@@ -45,7 +45,7 @@ const WATCHDOG_MARGIN: Duration = Duration::from_millis(50);
 /// What the watchdog of the arm does when the host is silent (D24).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WatchdogAction {
-    /// The joints hold.
+    /// Each joint holds at its set-point, which becomes its target.
     Hold,
     /// Damping protection: the arm sinks slowly.
     Damping,
@@ -85,7 +85,7 @@ impl StreamOptions {
         Self { watchdog: (steps, action), ..self }
     }
 
-    /// The time between two points.
+    /// The time between two points, 5 ms to 1 s.
     #[must_use]
     pub const fn period(self) -> Duration {
         Duration::from_millis(self.period_ms as u64)
@@ -255,13 +255,13 @@ impl<'a> SetPointStream<'a> {
         Ok(())
     }
 
-    /// The time between two points.
+    /// The time between two points, 5 ms to 1 s.
     #[must_use]
     pub const fn period(&self) -> Duration {
         self.options.period()
     }
 
-    /// Period and watchdog.
+    /// The period and the watchdog with which the stream was opened.
     #[must_use]
     pub const fn options(&self) -> StreamOptions {
         self.options

@@ -51,7 +51,7 @@ fn markdown_table(map: Map) -> String {
     page
 }
 
-/// Constants for C and C++.
+/// Constants for C and C++: the output of `sevenbot registers --format c`.
 #[must_use]
 pub fn c_header() -> String {
     let mut header = "\
@@ -73,7 +73,7 @@ pub fn c_header() -> String {
     header
 }
 
-/// Constants for Python.
+/// Constants for Python: the output of `sevenbot registers --format python`.
 #[must_use]
 pub fn python() -> String {
     let mut module =
@@ -132,7 +132,7 @@ fn addresses(row: &Register) -> String {
     if row.count == 1 { row.address.to_string() } else { Span::of(row).to_string() }
 }
 
-/// The name of a region.
+/// `ROM`, `EEPROM` or `RAM`, as the tables show it.
 #[must_use]
 pub const fn region(region: Region) -> &'static str {
     match region {
@@ -142,7 +142,7 @@ pub const fn region(region: Region) -> &'static str {
     }
 }
 
-/// The name of an access.
+/// `RO`, `RW` or `reserved`, as the tables show it.
 #[must_use]
 pub const fn access(access: Access) -> &'static str {
     match access {
@@ -174,7 +174,7 @@ fn default(row: &Register) -> String {
     }
 }
 
-/// The description of a row.
+/// The doc comment of the row in the register map, as one line.
 #[must_use]
 pub fn description(row: &Register) -> String {
     row.doc.iter().map(|line| line.trim()).collect::<Vec<_>>().join(" ")

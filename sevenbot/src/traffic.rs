@@ -27,7 +27,7 @@ pub enum Traffic {
     Read {
         /// The first register.
         address: u8,
-        /// The number of registers.
+        /// The number of registers; the answer has as many values.
         count: u8,
     },
     /// The answer to a read, or a report.
@@ -37,7 +37,7 @@ pub enum Traffic {
         /// One byte for each register.
         values: Vec<u8>,
     },
-    /// A request to write.
+    /// A request to write in map 2.2 ([D6](protocol_core::decisions#d6)).
     Write {
         /// The first register.
         address: u8,
@@ -69,7 +69,7 @@ pub enum Traffic {
     TooFar {
         /// The first register.
         address: u8,
-        /// The number of registers.
+        /// The number of registers: more than 256 - `address`.
         count: u8,
     },
     /// Bytes that do not form a frame.
@@ -141,7 +141,7 @@ enum LeadingBytes {
 }
 
 impl TrafficParser {
-    /// Adds received bytes.
+    /// Adds bytes in the order of the line. [`Self::next`] returns what they form.
     pub fn push(&mut self, bytes: &[u8]) {
         self.waiting.extend(bytes);
     }

@@ -32,7 +32,7 @@ impl Angle {
         if byte <= Self::MAX_DEGREES { Self(byte) } else { Self(Self::MAX_DEGREES) }
     }
 
-    /// The angle in degrees.
+    /// The angle in degrees, 0 to 180.
     #[must_use]
     pub const fn degrees(self) -> u8 {
         self.0
@@ -82,13 +82,13 @@ impl Speed {
         found.filter(|_| degrees_per_second <= 190.0 + ROUNDING)
     }
 
-    /// The register's value.
+    /// The register's value: steps of 1.9 degrees/s, or 0 for the maximum.
     #[must_use]
     pub const fn steps(self) -> u8 {
         self.0
     }
 
-    /// The speed in degrees/s.
+    /// The speed in degrees/s: 1.9 to 190, or 372 for the maximum.
     #[must_use]
     pub fn degrees_per_second(self) -> f64 {
         match self.0 {
@@ -127,13 +127,13 @@ impl MoveTime {
         found.filter(|_| seconds > 0.0)
     }
 
-    /// The register's value.
+    /// The register's value: steps of 100 ms, 0 to 100.
     #[must_use]
     pub const fn steps(self) -> u8 {
         self.0
     }
 
-    /// The duration.
+    /// The duration, 0 to 10 s.
     #[must_use]
     pub const fn duration(self) -> Duration {
         // Lossless; `From` is not const.

@@ -89,18 +89,18 @@ impl<L: HostLine> HostLine for LoggedLine<L> {
 pub enum Sender {
     /// The program.
     Host,
-    /// The arm.
+    /// The arm: the bytes that the program received.
     Arm,
 }
 
-/// Bytes that one side sent.
+/// Bytes that one side sent, and when.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LogEntry {
     /// Since the start of the log, or in a recorded session since power-up.
     pub time: Duration,
-    /// Who sent them.
+    /// The side that sent them: an entry never holds bytes of both.
     pub sender: Sender,
-    /// The bytes.
+    /// The bytes, which need not be whole frames.
     pub bytes: Vec<u8>,
 }
 

@@ -16,7 +16,7 @@ use crate::wait::{TIMEOUT, wait_for};
 pub struct ReplyFrame {
     /// The address of the first register.
     pub address: u8,
-    /// The values of the registers.
+    /// One byte for each register from `address` on.
     pub values: Vec<u8>,
 }
 
@@ -78,7 +78,7 @@ impl ArmClient {
         panic!("no reply to a read of {count} registers at {address}");
     }
 
-    /// The value of one register.
+    /// Reads one register.
     #[track_caller]
     pub fn register(&mut self, address: u8) -> u8 {
         self.read(address, 1)[0]

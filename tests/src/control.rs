@@ -22,7 +22,7 @@ impl Control {
         self.0.get_mut().write_all(bytes).expect("it accepts bytes");
     }
 
-    /// The next answer.
+    /// Waits for the next answer: one line of JSON.
     pub fn answer(&mut self) -> Value {
         let mut line = String::new();
         self.0.read_line(&mut line).expect("an answer");

@@ -64,7 +64,7 @@ impl FrameSplitter {
         Self { bytes: Vec::new(), is_of_arm, count: 0 }
     }
 
-    /// Adds bytes that have come.
+    /// Adds bytes in the order in which they came.
     pub fn push(&mut self, bytes: &[u8]) {
         self.bytes.extend(bytes);
     }

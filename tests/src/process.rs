@@ -23,7 +23,7 @@ pub struct RunningProgram {
 }
 
 impl RunningProgram {
-    /// Starts a program.
+    /// Starts a program. Panics if the system cannot start it.
     #[must_use]
     pub fn spawn(command: &mut Command) -> Self {
         let child = command.spawn().unwrap_or_else(|error| panic!("{command:?}: {error}"));

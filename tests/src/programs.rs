@@ -4,14 +4,14 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
 
-/// The simulator.
+/// The path of `host-sim`, the simulator.
 #[must_use]
 pub fn host_sim() -> &'static Path {
     static PATH: OnceLock<PathBuf> = OnceLock::new();
     PATH.get_or_init(|| program("host-sim", "host-sim"))
 }
 
-/// The command line tool.
+/// The path of `sevenbot`, the command line tool.
 #[must_use]
 pub fn sevenbot() -> &'static Path {
     static PATH: OnceLock<PathBuf> = OnceLock::new();

@@ -34,7 +34,7 @@ pub const PRESENT_POSITION: u8 = 54;
 pub const LIMITS: u8 = 188;
 /// First of the sixteen registers of the status block.
 pub const STATUS: u8 = 240;
-/// Fault bits.
+/// Fault bits of the status block; 0: there is no fault.
 pub const FAULTS: u8 = 241;
 /// Servos that do not reply, bit n-1 for joint n.
 pub const MISSING_SERVOS: u8 = 242;
@@ -59,5 +59,5 @@ pub const SUPPLY_VOLTAGE: u8 = 254;
 /// Highest servo temperature in degrees Celsius.
 pub const SERVO_TEMPERATURE: u8 = 255;
 
-/// The default targets.
+/// The default targets in degrees, joint 1 first.
 pub const STANDARD_POSE: [u8; 7] = [90, 90, 65, 90, 90, 90, 80];

@@ -47,7 +47,7 @@ pub enum LineAction {
     Unplug,
 }
 
-/// A frame on the line.
+/// A frame that the relay is about to pass on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Passing<'a> {
     /// From the program to the arm.
@@ -59,11 +59,11 @@ pub enum Passing<'a> {
 /// Sees each frame before it is passed on.
 pub type Watch = Box<dyn FnMut(Passing<'_>) + Send>;
 
-/// What happens on the line.
+/// What the relay does besides passing frames on.
 pub struct RelayPlan {
     /// When the action takes place.
     pub moment: Moment,
-    /// The action.
+    /// What the test does at this moment. The result says what happens to the line.
     pub action: Box<dyn FnMut() -> LineAction + Send>,
     /// If true, the relay makes the checksum of every 9th request, every 9th report and every 7th other frame of the arm wrong.
     /// These numbers let at least one of three successive tries of a read succeed.
@@ -125,7 +125,7 @@ impl Relay {
         Self { path, _terminal: terminal, is_over, thread }
     }
 
-    /// The path of the port.
+    /// The path of the port that the program opens.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path

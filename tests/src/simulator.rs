@@ -14,11 +14,11 @@ use crate::programs::{host_sim, tool};
 /// A running simulator, and a temporary folder for its sockets and the files of a test.
 #[derive(Debug)]
 pub struct Simulator {
-    /// Its process.
+    /// The process of `host-sim`.
     pub process: RunningProgram,
-    /// The ports of its arms.
+    /// The ports of its arms, the first arm first.
     pub ports: Vec<PathBuf>,
-    /// Its folder.
+    /// Holds its sockets and the files of the test.
     pub folder: TempDir,
 }
 
@@ -51,7 +51,7 @@ impl Simulator {
         paths
     }
 
-    /// Runs `sevenbot sim`.
+    /// Runs `sevenbot sim`, which may fail.
     #[must_use]
     pub fn sim(&self, arguments: &[&str]) -> Output {
         let mut tool = tool();

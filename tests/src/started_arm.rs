@@ -21,7 +21,7 @@ use crate::programs::{host_sim, xtask};
 /// The kind of an arm: where its controller runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ArmKind {
-    /// The simulator.
+    /// The simulator: controller and servos in one process.
     Simulator,
     /// The firmware image in an emulator, with simulated servos.
     Emulator,
@@ -103,7 +103,6 @@ pub struct StartedArm {
     folder: TempDir,
 }
 
-/// The processes of an arm.
 struct Processes {
     controller: RunningProgram,
     servos: Option<RunningProgram>,

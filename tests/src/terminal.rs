@@ -55,7 +55,7 @@ impl Terminal {
         Self { pty, screen, output, program, painter: Some(painter) }
     }
 
-    /// Types keys.
+    /// Types keys: their characters, such as `\r` for Enter.
     pub fn keys(&self, keys: &str) {
         (&*self.pty).write_all(keys.as_bytes()).expect("the terminal takes keys");
     }

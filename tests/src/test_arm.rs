@@ -45,7 +45,7 @@ pub struct TestSetup {
 }
 
 impl TestSetup {
-    /// Any arm.
+    /// Without needs: any arm will do.
     #[must_use]
     pub fn any() -> Self {
         Self::default()
@@ -212,7 +212,7 @@ impl TestArm {
         self.write(EEPROM_LOCK, &[1]);
     }
 
-    /// Waits until a condition holds.
+    /// Polls until `holds` returns true. Panics with `condition` after [`wait::TIMEOUT`].
     #[track_caller]
     pub fn wait_until(&mut self, condition: &str, mut holds: impl FnMut(&mut Self) -> bool) {
         wait::wait_until(condition, || holds(self));
@@ -245,7 +245,7 @@ impl TestArm {
         });
     }
 
-    /// The measured positions.
+    /// The measured positions in degrees, joint 1 first.
     #[track_caller]
     pub fn positions(&mut self) -> Vec<u8> {
         self.read(PRESENT_POSITION, 7)

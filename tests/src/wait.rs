@@ -21,7 +21,7 @@ pub fn wait_for<T>(event: &str, mut poll: impl FnMut() -> Result<T, String>) -> 
     }
 }
 
-/// Polls until the condition holds.
+/// Polls until `holds` returns true. After [`TIMEOUT`], panics with `condition`.
 #[track_caller]
 pub fn wait_until(condition: &str, mut holds: impl FnMut() -> bool) {
     wait_for(condition, || if holds() { Ok(()) } else { Err("not yet".to_owned()) });

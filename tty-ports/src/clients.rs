@@ -25,7 +25,7 @@ use crate::holders::has_other_holder;
 /// Bytes for a few dozen reports.
 const BUFFER_LENGTH: usize = 2_048;
 
-/// The clients of all ports.
+/// Counts the clients of all ports, with one inotify instance.
 #[derive(Debug)]
 pub struct Clients {
     inotify: OwnedFd,
@@ -38,7 +38,6 @@ pub struct Clients {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ClientWatch(i32);
 
-/// The clients of one port.
 #[derive(Debug)]
 struct WatchedPort {
     terminal: PathBuf,
@@ -54,7 +53,7 @@ struct WatchedPort {
 /// The events at a port since the last call of [`Clients::take_news`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PortNews {
-    /// A client opened it.
+    /// A client opened the port, or was found after reports were lost.
     pub was_opened: bool,
     /// The last client closed it.
     pub was_emptied: bool,

@@ -24,18 +24,18 @@ pub enum SerialError {
     /// There is no device at this path.
     #[error("{}: there is no such port: plug the cable in; ports that are there: {}", path.display(), ports())]
     Absent {
-        /// The port.
+        /// The path that [`Serial::open`] got.
         path: PathBuf,
     },
     /// This user has no permission to open it.
     #[error("{}: you may not open it: join the group that owns it (number {group}, most often dialout: sudo usermod -aG dialout $USER) and log in again", path.display())]
     Forbidden {
-        /// The port.
+        /// The path that [`Serial::open`] got.
         path: PathBuf,
         /// The number of the group that owns the port; 0 if it cannot be read.
         group: u32,
     },
-    /// Another program has it.
+    /// Another program has locked the port, or opened it for itself only.
     #[error("{}: another program uses the port: end that one; 'fuser {}' tells its number", .0.display(), .0.display())]
     InUse(PathBuf),
     /// It is not a serial port.
@@ -44,24 +44,24 @@ pub enum SerialError {
     /// The adapter does not support the baud rate.
     #[error("{}: the adapter refuses {baud} baud ({cause}): choose another baud rate, or an adapter that can", path.display())]
     Baud {
-        /// The port.
+        /// The path that [`Serial::open`] got.
         path: PathBuf,
-        /// The baud rate.
+        /// The baud rate that was asked for, in bits per second.
         baud: u32,
         /// The system's reason.
         cause: io::Error,
     },
-    /// The operating system refused.
+    /// The operating system refused for another reason.
     #[error("{}: {cause}: unplug the adapter, plug it in again, and look what 'dmesg' says of it", path.display())]
     Refused {
-        /// The port.
+        /// The path that [`Serial::open`] got.
         path: PathBuf,
         /// The system's reason.
         cause: io::Error,
     },
 }
 
-/// An open port.
+/// An open serial port in raw mode, for this process only.
 #[derive(Debug)]
 pub struct Serial {
     port: OwnedFd,

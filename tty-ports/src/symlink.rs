@@ -30,9 +30,9 @@ pub enum SymlinkError {
         path.display(), target.display()
     )]
     InUse {
-        /// The path.
+        /// Where the link should be.
         path: PathBuf,
-        /// Where the link leads.
+        /// Where the link that is already there leads.
         target: PathBuf,
     },
     /// The path is a symbolic link to something that does not exist and is not a pseudo-terminal. So [`Symlink`] did not
@@ -42,15 +42,15 @@ pub enum SymlinkError {
         path.display(), target.display()
     )]
     Foreign {
-        /// The path.
+        /// Where the link should be.
         path: PathBuf,
-        /// Where the link leads.
+        /// Where the link that is already there leads.
         target: PathBuf,
     },
-    /// The operating system refused.
+    /// The operating system did not read, remove or create a link.
     #[error("{}: {cause}: choose a path in a directory that exists and that you can write to", path.display())]
     Refused {
-        /// The path.
+        /// Where the link should be.
         path: PathBuf,
         /// The system's reason.
         cause: io::Error,

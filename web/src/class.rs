@@ -106,14 +106,14 @@ pub fn stop_of_the_real_arm() -> String {
 /// What moves the arm, other than a person.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Activity {
-    /// Nothing.
+    /// Nothing: at most a person moves the arm.
     #[default]
     None,
-    /// A program runs.
+    /// A program of blocks runs.
     Program,
-    /// A movement is played.
+    /// A recording is played.
     Playing,
-    /// The arm is being parked.
+    /// A [`Park`](crate::park::Park) is in progress.
     Parking,
 }
 

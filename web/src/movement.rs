@@ -42,7 +42,7 @@ pub enum PlayRefusal {
     TooFar(StartTooFar),
 }
 
-/// The progress of a movement.
+/// What [`Player::poll`] returns: whether the movement goes on or has ended.
 #[derive(Clone, Debug, PartialEq)]
 pub enum PlayProgress {
     /// The movement is not over yet.
@@ -94,7 +94,7 @@ enum Stage {
     Settling(Instant),
 }
 
-/// A movement that is played.
+/// Plays a recording on the arm, after the way to its first pose. [`Self::poll`] drives it.
 #[derive(Debug)]
 pub struct Player {
     recording: Recording,
@@ -182,7 +182,7 @@ impl Player {
         }
     }
 
-    /// The registers before the movement.
+    /// The registers before the movement, with the speeds and times to restore.
     #[must_use]
     pub fn into_before(self) -> Snapshot {
         self.before

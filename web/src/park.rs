@@ -33,12 +33,12 @@ const LONGEST_MOVE: Duration = Duration::from_micros(20_000_000);
 /// The arm has to stay in its pose for this time after it was let go.
 const WATCH_TIME: Duration = Duration::from_micros(2_000_000);
 
-/// The progress of a park.
+/// What [`Park::poll`] returns: whether the park goes on or has ended.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ParkProgress {
     /// The park is not over yet.
     Moving,
-    /// The arm is parked.
+    /// The arm was let go, and has stayed in its pose for 2 s.
     Parked,
     /// The park has failed, for this reason.
     Failed(ParkFailure),
@@ -79,7 +79,7 @@ enum Stage {
     LetGo([f32; 7], Instant, u64),
 }
 
-/// A park in progress.
+/// A park in progress, which [`Self::poll`] drives.
 #[derive(Debug)]
 pub struct Park {
     /// The registers before the park, with the speeds to restore.
@@ -110,7 +110,7 @@ impl Park {
         self.before.joints(&SPEED)
     }
 
-    /// The registers before the park.
+    /// The registers before the park, with the speeds to restore.
     #[must_use]
     pub fn into_before(self) -> Snapshot {
         self.before

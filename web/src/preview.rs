@@ -28,7 +28,7 @@ const STEPS_TO_POSE: u32 = 150;
 /// something.
 const NEAR: f32 = 3.0;
 
-/// The end of a preview.
+/// Why a preview ended.
 #[derive(Clone, Debug, PartialEq)]
 pub enum PreviewEnd {
     /// The program ran to its end.
@@ -39,7 +39,7 @@ pub enum PreviewEnd {
     TooLong,
 }
 
-/// A preview in progress.
+/// A program that runs on a simulated arm of its own in virtual time, and fills a [`TimeLine`].
 pub struct Preview {
     client: Client,
     arm: SimulatedSource,

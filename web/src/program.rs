@@ -35,7 +35,7 @@ use crate::stop::since_start;
 /// At most this many blocks begin in one poll. An endless loop continues in the next poll.
 const BLOCKS_PER_POLL: u32 = 200;
 
-/// The progress of a program.
+/// What [`ProgramRun::poll`] returns: whether the program runs, waits or has ended.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ProgramProgress {
     /// The program is not over yet.

@@ -9,7 +9,7 @@ use sevenbot::{FineAngle, Snapshot};
 use crate::client::BAUD;
 use crate::stop::since_start;
 
-/// A recording in progress.
+/// Collects the measured poses of the arm as the text of a recording.
 #[derive(Debug)]
 pub struct Recorder {
     start: Instant,
@@ -19,7 +19,7 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// Begins a recording at `now`.
+    /// Begins a recording. `now` is its time 0.
     #[must_use]
     pub fn new(now: Instant) -> Self {
         let lines = RecordingLines::new(FileVersion::Hundredths);

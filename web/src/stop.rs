@@ -10,7 +10,7 @@ use sevenbot::map::SPEED;
 /// Writes of registers: first address, values.
 type Frames = Vec<(u8, Vec<u8>)>;
 
-/// The progress of a stop.
+/// What became of the last stop of the page.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum StopProgress {
     /// There was no stop, or the arm got another command after it.

@@ -8,7 +8,7 @@ use crate::problems_in_chinese::words_and_remedy;
 /// A language of the page.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Language {
-    /// English.
+    /// English, also for browsers in any other language but Chinese.
     #[default]
     English,
     /// Simplified Chinese.
@@ -31,7 +31,7 @@ impl Language {
         }
     }
 
-    /// The other language.
+    /// The language to which the button of the page switches.
     #[must_use]
     pub const fn other(self) -> Self {
         match self {

@@ -24,7 +24,7 @@ pub struct TimeLine {
 }
 
 impl TimeLine {
-    /// Converts a recording.
+    /// The moments of a recording. They belong to no block.
     #[must_use]
     pub fn of(recording: &Recording) -> Self {
         let stand = |Moment { time, pose, .. }: Moment| Stand {

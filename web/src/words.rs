@@ -38,10 +38,10 @@ impl Mood {
     }
 }
 
-/// Whether the arm answers.
+/// Whether the arm answers the reads of the page.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Answers {
-    /// It has not answered yet.
+    /// No round of reads has been completed yet.
     NotYet,
     /// It answers, except for at most two rounds of reads in a row.
     Yes,

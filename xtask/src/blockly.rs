@@ -64,7 +64,6 @@ pub(crate) fn script() -> TaskResult<String> {
     Ok(script)
 }
 
-/// The text of Blockly's licence.
 pub(crate) fn licence() -> TaskResult<String> {
     Package::fetch()?.text(LICENCE)
 }

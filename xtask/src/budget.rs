@@ -58,7 +58,6 @@ impl Budget {
         self.committed.map_or_else(|| VARIES.to_owned(), |committed| committed.to_string())
     }
 
-    /// The violated limit, if any.
     fn violation(&self, value: u64) -> Option<String> {
         let is_increase = |committed: &u64| value > committed + committed * TOLERANCE / 100;
         match (self.max, self.committed.filter(is_increase)) {

@@ -9,7 +9,7 @@ use crate::workspace::{self, Package};
 /// The line before the picture.
 const BEGIN: &str = "<!-- begin: made by `cargo xtask docs` from `cargo metadata` -->\n";
 
-/// A group of crates.
+/// The name of a group, and its crates.
 type Group = (&'static str, &'static [&'static str]);
 
 /// Every crate belongs to one group.
@@ -53,7 +53,7 @@ const GROUPS: [Group; 3] = [
     ("measurement", &["bench", "footprint", "peers"]),
 ];
 
-/// The document with the picture.
+/// The document with the picture. Fails if a crate belongs to no group.
 pub(crate) fn files() -> TaskResult<Vec<GeneratedFile>> {
     generated::with_section("docs/design.md", BEGIN, &picture(&workspace::packages()?)?)
 }

@@ -9,7 +9,6 @@ use crate::{crate_graph, decisions, registers_md, ros_model};
 const GENERATORS: [fn() -> TaskResult<Vec<GeneratedFile>>; 4] =
     [registers_md::files, ros_model::files, decisions::files, crate_graph::files];
 
-/// Writes all files.
 pub(crate) fn write() -> TaskResult {
     for generate in GENERATORS {
         generate()?.into_iter().try_for_each(|(path, content)| fs::write(root().join(path), content))?;

@@ -15,7 +15,6 @@ use crate::venv;
 const PACKAGE: &str = "mujoco==3.3.7";
 /// Random legal poses.
 const POSES: usize = 5_000;
-/// The script that compares.
 const SCRIPT: &str = include_str!("mujoco.py");
 
 /// Installs MuJoCo into an environment of its own, and compares many poses. Fails above 0.01 mm, or if the actuators of the model

@@ -31,7 +31,6 @@ pub(crate) struct BenchArgs {
     streams: bool,
 }
 
-/// Measures and prints.
 pub(crate) fn run(args: &BenchArgs) -> TaskResult {
     let bench = |program: &str| cargo(&format!("run --quiet --release --package bench --bin {program}"));
     match args {

@@ -25,7 +25,6 @@ first. [protocol.md](protocol.md) defines the effect of a write, and the decisio
 
 ";
 
-/// The document docs/registers.md.
 pub(crate) fn files() -> TaskResult<Vec<GeneratedFile>> {
     Ok(vec![("docs/registers.md".to_owned(), (INTRODUCTION.to_owned() + &table::markdown()).into_bytes())])
 }

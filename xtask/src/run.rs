@@ -71,7 +71,6 @@ pub(crate) fn empty_folder(folder: &Path) -> io::Result<()> {
     fs::create_dir_all(folder)
 }
 
-/// Builds the firmware image.
 pub(crate) fn build_image() -> TaskResult {
     run("rustup", &format!("--quiet target add {CHIP}"), &[])?;
     cargo("fw --quiet")

@@ -123,7 +123,6 @@ pub(crate) fn run(
     Ok(())
 }
 
-/// A run of the steps.
 struct StepRun<E> {
     completed: Mutex<Vec<(&'static str, Times)>>,
     has_failed: AtomicBool,

@@ -46,7 +46,6 @@ fn days(days: u32) -> TaskResult {
     run::run("nice", &format!("cargo run --quiet --release --package torture -- {worlds}"), &[])
 }
 
-/// Runs all trials.
 pub(crate) fn run(args: &TortureArgs) -> TaskResult {
     let TortureArgs { minutes, seed } = args;
     let mut trials = Trials::default();

@@ -9,7 +9,6 @@ use crate::run::{TaskResult, root};
 use torture::text_table::Column::{Left, Right};
 use torture::text_table::TextTable;
 
-/// The trials so far.
 pub(crate) struct Trials {
     table: TextTable,
     has_failure: bool,

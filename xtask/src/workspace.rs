@@ -16,7 +16,6 @@ pub(crate) struct Metadata {
     pub(crate) resolve: Option<Resolve>,
 }
 
-/// A crate.
 #[derive(Clone, Default, Deserialize)]
 pub(crate) struct Package {
     pub(crate) id: String,

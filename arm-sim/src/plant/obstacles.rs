@@ -16,7 +16,6 @@ pub const HIGHEST_STIFFNESS: u16 = 5_000;
 pub const STRONGEST_PUSH: i16 = 10_000;
 /// When the claws open this far beyond a thing that they have touched, they drop it. In thousandths of a degree, assumed.
 const DROP_DISTANCE: i64 = 2_000;
-/// The joint of the claws.
 const CLAW: Joint = Joint::ALL[6];
 
 /// A wall in the way of a joint: in front of the joint or behind it, depending on where the joint is when the wall is

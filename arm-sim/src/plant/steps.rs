@@ -28,7 +28,6 @@ impl Plant {
         }
     }
 
-    /// Simulates one step.
     fn step(&mut self) {
         let before = self.now;
         self.now = before + STEP;

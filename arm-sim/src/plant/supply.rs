@@ -14,7 +14,6 @@ const NOMINAL_DECIVOLTS: u16 = 74;
 const DROP_DECIVOLTS: u16 = 3;
 /// The voltage during a dip, in 0.1 V: low enough to restart each servo. Assumed, like the duration.
 const DIP_DECIVOLTS: u16 = 30;
-/// The duration of a dip.
 const DIP: Duration = Duration::from_millis(20);
 
 /// A fault of the supply of the servos. The controller has its own supply.
@@ -25,7 +24,7 @@ pub enum SupplyFault {
     Volts(u8),
     /// Once in each period of this length the voltage falls to 3 V for 20 ms, and all servos restart.
     Dips(Duration),
-    /// No voltage.
+    /// No voltage: no servo answers.
     Off,
 }
 
@@ -77,7 +76,6 @@ pub(super) struct Supply {
     fault: Option<SupplyFault>,
     /// When the fault began.
     since: Instant,
-    /// The power switch is off.
     is_switched_off: bool,
     is_in_dip: bool,
     count: FaultCount,

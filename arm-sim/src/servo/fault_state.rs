@@ -22,7 +22,6 @@ pub(super) struct FaultState {
 }
 
 impl FaultState {
-    /// A servo without a fault.
     pub(super) const fn new() -> Self {
         Self {
             fault: None,

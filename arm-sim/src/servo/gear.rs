@@ -14,7 +14,6 @@ const CREEP: i64 = CREEP_COUNTS_PER_SECOND * COUNT_PER_SECOND;
 /// The torques on a joint in a step, in micronewton metres, positive towards more counts.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Torques {
-    /// The torque of the motor.
     pub(super) motor: i64,
     /// The torque from outside the servo.
     pub(super) outside: i64,
@@ -30,7 +29,6 @@ impl Torques {
     }
 }
 
-/// The constants of a gear.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Gear(pub(super) ServoParameters);

@@ -56,7 +56,6 @@ impl Servo {
         }
     }
 
-    /// The thing between the claws.
     pub(crate) const fn thing(&self) -> Option<Surface> {
         self.motor.surroundings.thing
     }

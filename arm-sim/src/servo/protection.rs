@@ -18,11 +18,8 @@ use crate::parameters::{OVERLOAD, OVERLOAD_MS};
 /// The limits in a servo's registers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Limits {
-    /// In degrees Celsius.
     pub(super) max_celsius: u8,
-    /// In 0.1 V.
     pub(super) max_decivolts: u8,
-    /// In 0.1 V.
     pub(super) min_decivolts: u8,
     /// The error bits that switch the motor off.
     pub(super) unloading: u8,

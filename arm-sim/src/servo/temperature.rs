@@ -14,7 +14,6 @@ const TIME_CONSTANT: u64 = THERMAL_TIME.as_micros() / 1_000_000;
 /// The square of the stall torque, in 0.1 %.
 const STALL_SQUARE: u64 = 1_000_000;
 
-/// A servo's temperature.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Temperature {

@@ -9,7 +9,7 @@ use motion_core::servo_bus::TorqueCodes;
 use super::{Hex, VERSION, bytes_from_hex};
 use crate::simulation::SimulationConfig;
 
-/// Which controller the arm has.
+/// The controller of a recorded arm. A [`Replay`](crate::replay::Replay) starts the same one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ControllerKind {
     /// The controller of this project.
@@ -23,7 +23,7 @@ pub enum ControllerKind {
 pub struct SessionHeader {
     /// The version of the program that recorded the session.
     pub program: String,
-    /// The controller of the arm.
+    /// The controller of the arm: `controller=sevenbot` or `controller=maker`.
     pub controller: ControllerKind,
     /// The seed of the random faults of the host line.
     pub seed: u64,

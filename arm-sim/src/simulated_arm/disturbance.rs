@@ -19,7 +19,7 @@ use crate::plant::Plant;
 use crate::servo_bus::ServoBus;
 
 impl<F: NorFlash, C: ArmController> SimulatedArm<F, Plant, C> {
-    /// The controller.
+    /// The controller, for example to read its registers.
     #[must_use]
     pub const fn controller(&self) -> &C {
         &self.controller

@@ -21,7 +21,7 @@ impl<F: NorFlash, C: ArmController> SimulatedArm<F, Plant, C> {
         self.clear_host_line();
     }
 
-    /// Does the arm have power?
+    /// Is the arm on? False from [`SimulatedArm::power_off`] until the controller starts again.
     #[must_use]
     pub const fn has_power(&self) -> bool {
         !self.is_off

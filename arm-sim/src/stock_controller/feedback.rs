@@ -2,7 +2,6 @@
 
 use protocol_core::time::{Duration, Instant};
 
-/// A stream of feedback frames.
 #[derive(Clone, Debug)]
 pub(super) struct Feedback {
     period: Duration,

@@ -10,7 +10,6 @@ use protocol_core::registers::{JOINTS, Register};
 
 use super::registers::StockRegisters;
 
-/// A solver of the firmware.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Solver {
     Ik5,

@@ -56,7 +56,7 @@ const INPUT_BUFFER: usize = 256;
 /// The baud code for 1 Mbaud. All others mean 115,200 baud.
 const FAST: u8 = 3;
 
-/// The maker's controller.
+/// The controller of an arm with the maker's firmware, to test host programs.
 #[derive(Clone, Debug)]
 pub struct StockController {
     config: Config,

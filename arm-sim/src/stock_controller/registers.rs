@@ -24,7 +24,6 @@ const TIME_AT_START: u8 = 232;
 /// The first register that is stored in an [`Image`].
 const IMAGE_START: u8 = CHIP_ID.address + CHIP_ID.count;
 
-/// The values of the registers.
 #[derive(Clone, Debug)]
 pub(super) struct StockRegisters {
     values: [u8; COUNT],
@@ -117,7 +116,7 @@ impl StockRegisters {
         bytes
     }
 
-    /// The values of a read.
+    /// The values of `count` registers from `first` on; 0 past 255.
     pub(super) fn read(&self, first: u8, count: u8) -> Vec<u8> {
         (0..count).map(|index| first.checked_add(index).map_or(0, |address| self.get(address))).collect()
     }

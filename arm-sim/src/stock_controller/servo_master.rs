@@ -16,7 +16,6 @@ pub(super) struct ServoGoal {
     pub(super) speed: u16,
 }
 
-/// The result of a read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum ReadOutcome {
     Measured(Reading),

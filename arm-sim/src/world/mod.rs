@@ -41,7 +41,7 @@ const PLAY: f64 = 4.0;
 /// The cup takes an object at this distance or nearer, in mm.
 const SUCTION: f64 = 3.0;
 
-/// An object in the room.
+/// A cube or cylinder of the scene, where it is now.
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Object {
@@ -49,7 +49,7 @@ pub struct Object {
     pub item: Item,
     /// Its present position: the origin is its middle.
     pub frame: Frame,
-    /// Does the arm carry it?
+    /// Do the claws or the cup hold it? Then it moves with the tip, and does not fall.
     pub is_carried: bool,
     solid: Solid,
     /// Downward, in mm per second.

@@ -8,7 +8,6 @@ use super::frame::Point;
 use super::hand::Ball;
 use super::{Object, World};
 
-/// A step in seconds.
 const STEP_S: f64 = 0.001;
 /// In mm per second squared.
 const GRAVITY: f64 = 9_807.0;
@@ -20,7 +19,6 @@ const NEAR: f64 = 0.5;
 const LONGEST_ROW: u32 = 4;
 
 impl World {
-    /// Lets objects fall.
     pub(super) fn fall(&mut self) {
         for index in 0..self.objects.len() {
             let Some(object) = self.objects.get(index).filter(|object| !object.is_carried) else { continue };

@@ -46,7 +46,7 @@ impl Room {
         self.0.advance(Duration::from_millis(2_500));
     }
 
-    /// The joints that are blocked.
+    /// The blocked joints, one bit each.
     fn blocked(&mut self) -> u8 {
         // The registers of the joints are updated when a host reads them.
         self.0.send_request(&Request::Read { address: BLOCKED_JOINTS, count: 1 });
@@ -54,7 +54,6 @@ impl Room {
         self.0.registers().get(BLOCKED_JOINTS)
     }
 
-    /// Where an object is.
     fn place(&self, name: &str) -> Vector<f64> {
         let world = self.0.plant().world().unwrap();
         world.objects().iter().find(|object| object.item.name == name).unwrap().frame.origin

@@ -12,7 +12,6 @@ use protocol_core::wire::crc::checksum;
 
 type StockArm = SimulatedArm<Flash, Plant, StockController>;
 
-/// An arm, and the time.
 struct Bench {
     arm: StockArm,
     now: Instant,

@@ -45,7 +45,6 @@ const REQUESTS: usize = 2_000;
 /// Rounds of each server and each case.
 const ROUNDS: usize = 301;
 
-/// A server under comparison.
 struct MeasuredServer {
     name: &'static str,
     protocol: Protocol,

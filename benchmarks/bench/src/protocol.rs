@@ -21,7 +21,6 @@ const HOST: [u8; 2] = [255, 190];
 /// MAVLink system and component of the arm.
 const ARM: [u8; 2] = [1, 1];
 
-/// The protocol of a stream.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Protocol {
     /// This project's protocol.

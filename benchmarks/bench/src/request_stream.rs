@@ -10,9 +10,7 @@ use crate::protocol::Protocol;
 /// One row of the table.
 pub(crate) struct Case {
     pub(crate) name: &'static str,
-    /// Generates the next operation.
     operation: fn(&mut Rng) -> RegisterOperation,
-    /// Damaged requests in a thousand.
     damaged_per_mille: u32,
 }
 
@@ -57,7 +55,6 @@ pub(crate) struct RequestStream {
     pub(crate) requests: Vec<u8>,
     /// The replies to the undamaged requests.
     pub(crate) replies: Vec<u8>,
-    /// The number of undamaged requests.
     pub(crate) undamaged: usize,
 }
 
@@ -85,7 +82,7 @@ impl RequestStream {
     }
 }
 
-/// Flips bits of one byte.
+/// Flips bits of one byte. An index beyond the frame wraps.
 fn flip(frame: &mut [u8], byte: usize, bits: u8) {
     let index = byte % frame.len().max(1);
     if let Some(byte) = frame.get_mut(index) {

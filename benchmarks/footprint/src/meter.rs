@@ -46,7 +46,7 @@ impl Meter {
         count_so_far().wrapping_sub(start).wrapping_sub(self.overhead)
     }
 
-    /// Sends a figure.
+    /// Sends a line on USART1: the name, a tab, and the figure in decimal.
     #[inline(never)]
     pub fn print(&self, name: &str, figure: u32) {
         name.bytes().for_each(send);

@@ -8,7 +8,7 @@ use protocol_core::wire::{Deframer, FrameBuffer, ToArm};
 
 use crate::Server;
 
-/// This project's server.
+/// This project's server: [`Deframer`] and [`RegisterFile`] of protocol-core.
 pub struct OurServer {
     now: Instant,
     deframer: Deframer<ToArm>,

@@ -16,7 +16,6 @@ const CRC: Crc<u16> = Crc::<u16>::new(&CRC_16_MODBUS);
 /// Longer than any frame: 255 values, header, CRC and the bytes that COBS adds.
 const ROOM: usize = 272;
 
-/// A request.
 #[derive(Deserialize)]
 enum PostcardRequest<'a> {
     Read { address: u8, count: u8 },

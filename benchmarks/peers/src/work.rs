@@ -45,7 +45,7 @@ pub struct Requests {
     pub read_of_61: &'static [u8],
 }
 
-/// This project's protocol.
+/// This project's protocol, functions 3 and 6.
 pub const SEVEN_BOT: Requests = Requests {
     read_of_7: b"\xaa\x77\x03\x2e\x07\x8b\xce",
     write_of_7: b"\xaa\x77\x06\x2e\x07\x5a\x5a\x41\x5a\x5a\x5a\x50\xf9\x91",

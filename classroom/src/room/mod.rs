@@ -64,7 +64,7 @@ enum Refused {
     Teacher,
 }
 
-/// The state of a class.
+/// A class. Messages and the time come in as arguments; it opens no port.
 #[derive(Debug)]
 pub struct Classroom {
     info: ClassInfo,

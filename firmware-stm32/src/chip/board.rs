@@ -37,7 +37,7 @@ pub const USART_FUNCTION: u8 = 7;
 /// The servos' baud rate as delivered.
 pub const SERVO_BAUD: u32 = 1_000_000;
 
-/// Vacuum pump.
+/// Vacuum pump, on at the level [`VACUUM_ACTIVE`].
 pub const PUMP: Pin = Pin::new(GpioPort::C, 6);
 /// Valve that lets air into the cup.
 pub const VALVE: Pin = Pin::new(GpioPort::C, 7);

@@ -23,7 +23,7 @@ pub struct ChipFlashRegisters<'a> {
 }
 
 impl<'a> ChipFlashRegisters<'a> {
-    /// Takes ownership of the registers.
+    /// Takes ownership of the registers, and changes none.
     pub const fn new(registers: pac::FLASH, power: pac::PWR, watchdog: &'a Watchdog) -> Self {
         Self { registers, power, watchdog }
     }

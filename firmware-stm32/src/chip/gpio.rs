@@ -12,21 +12,20 @@ pub fn enable(rcc: &pac::RCC) {
     let _ = rcc.ahb1enr().read();
 }
 
-/// The registers of a port.
 type GpioRegisters = pac::gpioi::RegisterBlock;
 
 /// The ports that have all their 16 pins on the 64-pin package.
 #[derive(Clone, Copy)]
 pub enum GpioPort {
-    /// Port A.
+    /// GPIOA: pins PA0 to PA15.
     A,
-    /// Port B.
+    /// GPIOB: pins PB0 to PB15.
     B,
-    /// Port C.
+    /// GPIOC: pins PC0 to PC15.
     C,
 }
 
-/// A pin of the chip.
+/// A pin of the chip, by its port and its number.
 #[derive(Clone, Copy)]
 pub struct Pin {
     port: GpioPort,
@@ -36,9 +35,9 @@ pub struct Pin {
 /// The level that switches the connected device on.
 #[derive(Clone, Copy)]
 pub enum Active {
-    /// The high level.
+    /// The device is on at the high level.
     High,
-    /// The low level.
+    /// The device is on at the low level.
     Low,
 }
 

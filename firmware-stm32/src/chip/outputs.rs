@@ -5,11 +5,11 @@ use super::gpio::{DigitalOutput, Switch};
 
 /// The devices that the firmware switches.
 pub struct Outputs {
-    /// The vacuum pump.
+    /// The vacuum pump, on [`board::PUMP`].
     pub pump: Switch<DigitalOutput>,
     /// The valve that lets air into the cup.
     pub valve: Switch<DigitalOutput>,
-    /// The status LED.
+    /// The status LED, on [`board::LED`].
     pub led: Switch<DigitalOutput>,
 }
 

@@ -55,7 +55,7 @@ impl BusDirection for ServoDirection {
     }
 }
 
-/// Opens the servo bus.
+/// Opens the servo bus at [`board::SERVO_BAUD`], half duplex. The board listens.
 pub fn open(usart: USART2, rates: ClockRates, nvic: &mut NVIC) -> ServoLink {
     ServoDirection.open();
     board::SERVO_BUS.give_to(board::USART_FUNCTION, OutputType::OpenDrain);

@@ -32,12 +32,12 @@ use crate::serial_line::{BusDirection, SerialLine, Taken, TransmitEvent, UsartRe
 /// The most bytes that the loop moves in one critical section.
 pub const CHUNK: usize = 8;
 
-/// One of the chip's USARTs.
+/// A USART of the chip that a line can have: USART1 or USART2.
 pub trait Usart {
-    /// Its interrupt.
+    /// The interrupt whose handler calls [`SharedUart::serve`].
     const INTERRUPT: pac::Interrupt;
 
-    /// Its registers.
+    /// Its registers, in the layout of USART1.
     fn registers() -> &'static pac::usart1::RegisterBlock;
 }
 
@@ -94,7 +94,7 @@ pub struct Setup {
     pub divisor: u16,
     /// Half duplex: transmit and receive on the TX pin.
     pub one_wire: bool,
-    /// Interrupt priority.
+    /// Interrupt priority, in the upper four bits; 0 is the most urgent.
     pub priority: u8,
 }
 
@@ -121,7 +121,7 @@ impl<U: Usart, D: BusDirection, const RECEIVE: usize, const TRANSMIT: usize>
         UartPort { line: self, chunk: [0; CHUNK], len: 0, taken: 0 }
     }
 
-    /// The interrupt handler.
+    /// Handles the interrupt. Masks it when a byte cannot be taken, because the receive queue is full.
     pub fn serve(&self) {
         self.with(|line| {
             if !line.serve() {

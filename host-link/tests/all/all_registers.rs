@@ -5,7 +5,6 @@ use protocol_core::time::{Duration, Instant};
 
 use crate::common::{PATIENCE, at_ms, events, link, reply, span};
 
-/// What becomes of a reply.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Fate {
     Arrives,

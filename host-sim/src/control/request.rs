@@ -3,7 +3,7 @@
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-/// A request.
+/// A request of a client: a line of a control socket.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(
     tag = "do",
@@ -53,9 +53,9 @@ pub enum ControlRequest {
         #[serde(default)]
         alarm: Alarm,
     },
-    /// Switches the power.
+    /// Switches the power of the arm.
     Power {
-        /// What the power switch does.
+        /// The switch: off, on, or off and on again.
         to: Power,
     },
     /// Restarts the controller. The servos keep their power.
@@ -78,12 +78,12 @@ pub enum ControlRequest {
     },
     /// Keeps a copy of the arm and of virtual time.
     Snapshot {
-        /// The name of the copy.
+        /// The name of the copy, 1 to 64 characters.
         name: String,
     },
     /// Sets the arm and virtual time back to a copy.
     Restore {
-        /// The name of the copy.
+        /// The name of a copy that was kept.
         name: String,
     },
     /// Asks for the state of the arm.
@@ -151,7 +151,7 @@ pub enum Power {
     Cycle,
 }
 
-/// Why a request was refused.
+/// Why a request was refused: the members of an answer that is an error.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ControlRefusal {
     /// What is wrong.
@@ -161,7 +161,7 @@ pub struct ControlRefusal {
 }
 
 impl ControlRefusal {
-    /// A refusal with a hint.
+    /// A refusal with the text of `error`.
     #[must_use]
     pub fn new(error: impl ToString, hint: &'static str) -> Self {
         Self { error: error.to_string(), hint }

@@ -24,7 +24,7 @@ const LONGEST_BACKLOG: usize = 64 * 1_024;
 /// The most clients at the same time.
 const CLIENTS: usize = 16;
 
-/// How a request is answered.
+/// When a request is answered, and with what.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum ControlReply {
     /// At once, with this line.
@@ -63,7 +63,7 @@ impl ControlSocket {
         Ok(Self { socket: PrivateSocket::listen("control", path)?, clients: Vec::new() })
     }
 
-    /// The path of the socket.
+    /// The path that was passed to [`ControlSocket::listen`].
     #[must_use]
     pub fn path(&self) -> &Path {
         self.socket.path()

@@ -8,7 +8,6 @@ const POSES: usize = 1_000_000;
 /// The most that positions may differ, in mm.
 const ALLOWED: f64 = 0.01;
 
-/// A vector in `f64`.
 fn exact<F: Float + Into<f64>>(vector: Vector<F>) -> Vector<f64> {
     Vector::new(vector.x.into(), vector.y.into(), vector.z.into())
 }

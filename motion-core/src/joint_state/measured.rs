@@ -1,6 +1,5 @@
 //! What a reading of a servo meant for its joint.
 
-/// The effect of a reading.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Measured {
     /// The position filter rejected the reading.

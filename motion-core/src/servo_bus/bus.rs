@@ -18,10 +18,10 @@ const GOAL_REGISTERS: usize = 6;
 /// How many different read lengths there are.
 const READ_LENGTHS: u8 = 4;
 
-/// What a servo answered.
+/// The content of a valid answer of a servo.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Answer {
-    /// The measured values.
+    /// Position, speed, load, supply voltage and temperature.
     pub reading: Reading,
     /// The error bits, see [`frame::error`].
     pub alarms: u8,
@@ -44,7 +44,7 @@ pub struct HeldGoal {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Question {
-    /// The measurements.
+    /// The measurements, without the torque switch and the goal.
     Reading,
     /// The torque switch, the goal, and the measurements.
     TorqueAndReading,
@@ -86,18 +86,18 @@ impl Question {
 /// The outcome of a read from a servo.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// The servo answered.
+    /// The servo sent a valid answer in time.
     Measured {
-        /// The joint of the servo.
+        /// The joint whose servo was asked.
         joint: Joint,
-        /// What it answered.
+        /// The measurements, the error bits and the answer time.
         answer: Answer,
         /// Was the answer processed within a control cycle after the timeout? After that the joint may have moved.
         is_timely: bool,
     },
     /// The servo did not send a valid answer in time.
     Failed {
-        /// The joint of the servo.
+        /// The joint whose servo was asked.
         joint: Joint,
     },
 }

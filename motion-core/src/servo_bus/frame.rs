@@ -31,7 +31,7 @@ const UNCOUNTED: usize = 4;
 /// The broadcast id. No servo answers a broadcast.
 pub const BROADCAST: u8 = 0xFE;
 
-/// An encoded frame.
+/// An encoded frame, from either end of the bus.
 pub type ServoFrameBuffer = heapless::Vec<u8, MAX_FRAME>;
 
 /// The instruction in a frame to a servo.
@@ -41,7 +41,7 @@ pub type ServoFrameBuffer = heapless::Vec<u8, MAX_FRAME>;
 pub enum Instruction {
     /// Asks for an answer without values.
     Ping = 0x01,
-    /// Reads registers.
+    /// Asks for registers; the servo answers with their values.
     Read = 0x02,
     /// Writes registers; the servo acknowledges.
     Write = 0x03,
@@ -66,7 +66,7 @@ impl Instruction {
 /// The baud rates of an SCS servo, in the order of the codes of [`register::BAUD_RATE`].
 pub const BAUD_RATES: [u32; 8] = [1_000_000, 500_000, 250_000, 128_000, 115_200, 76_800, 57_600, 38_400];
 
-/// Encodes a ping.
+/// Encodes a ping, which the servo answers without values.
 pub fn ping(buffer: &mut ServoFrameBuffer, id: u8) {
     begin(buffer, id, Instruction::Ping as u8);
     finish(buffer);

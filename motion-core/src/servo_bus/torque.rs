@@ -8,7 +8,7 @@ pub enum Torque {
     Damping,
     /// The motor moves to its goal and holds it.
     On,
-    /// The motor turns freely.
+    /// No torque and no brake: the joint can be moved by hand.
     Free,
 }
 
@@ -25,7 +25,7 @@ pub enum TorqueCodes {
 }
 
 impl TorqueCodes {
-    /// The code for `torque`.
+    /// The value of the torque switch, servo register 40, for `torque`.
     #[must_use]
     pub const fn code(self, torque: Torque) -> u8 {
         match (self, torque) {

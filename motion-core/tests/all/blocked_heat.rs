@@ -7,7 +7,6 @@ use protocol_core::registers::Joint;
 const PUSH_LIMIT: u8 = 193;
 const BLOCKED: u8 = 195;
 const ALARMS: u8 = 197;
-/// The alarm bit of heat.
 const HEAT: u8 = 1 << 2;
 const MINUTES: u64 = 30;
 

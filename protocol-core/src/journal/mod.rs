@@ -78,7 +78,7 @@ const NO_SETTINGS: Image = Image([0xFF; Image::LENGTH]);
 pub enum Opened {
     /// Nothing was ever saved: the flash was blank, the first start was interrupted, or the log has no settings yet.
     Fresh,
-    /// The saved settings.
+    /// The settings in the newest valid record of the log.
     Found(Image),
     /// The flash was not blank, but held no valid record. It was erased and is in use as a fresh flash. A caller that wants
     /// to refuse such a flash opens a copy of it first.

@@ -12,7 +12,6 @@ use crate::registers::Image;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct FlashRefused;
 
-/// The address of a slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct SlotAddress {

@@ -17,7 +17,6 @@ use crate::registers::Image;
 
 /// The unit of programming.
 pub(super) type Word = [u8; 4];
-/// Eight words.
 pub(super) type Slot = [Word; 8];
 /// Bytes of a slot.
 pub(super) const LENGTH: u32 = 32;
@@ -33,7 +32,6 @@ const CHECK: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
 /// damaged flash may hold any generation.
 const LAST_GENERATION: u32 = u32::MAX / 2;
 
-/// The generation `steps` after `generation`.
 pub(super) const fn generation_after(generation: u32, steps: u32) -> u32 {
     generation.wrapping_add(steps) & LAST_GENERATION
 }

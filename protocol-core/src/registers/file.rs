@@ -181,7 +181,7 @@ impl RegisterFile {
         (start, values.get(usize::from(start - address)..).unwrap_or(&[]))
     }
 
-    /// Applies a checked write.
+    /// Applies a checked write. Registers on which a write has no effect keep their values.
     pub fn apply(&mut self, accepted: &Accepted<'_>) {
         if self.offsets.is_some() {
             self.show_offsets(Map::V22);

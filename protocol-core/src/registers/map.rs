@@ -164,7 +164,8 @@ pub mod fault {
 pub mod servo_alarm {
     /// The supply is too low or too high.
     pub const VOLTAGE: u8 = 1 << 0;
-    /// The motor is too hot.
+    /// The motor is too hot. A joint that was let go for it engages only after its servo cooled down by 5 degrees Celsius
+    /// ([D28](crate::decisions#d28)).
     pub const OVERHEAT: u8 = 1 << 2;
     /// The motor was overloaded for too long. The bit stays until torque is switched off and on.
     pub const OVERLOAD: u8 = 1 << 5;
@@ -194,13 +195,13 @@ pub mod motor_state {
     pub const DAMPING: u8 = 0;
     /// The joints are driven to their targets.
     pub const SERVO: u8 = 1;
-    /// The joints move freely.
+    /// The joints are neither driven nor damped: the arm can be moved by hand.
     pub const FORCELESS: u8 = 2;
 }
 
 /// The values of [`EFFECTOR_TYPE`].
 pub mod effector {
-    /// A suction cup.
+    /// A suction cup: joint 7 has the push limit of the other joints.
     pub const SUCTION_CUP: u8 = 0;
     /// A gripper: joint 7 is its claw.
     pub const GRIPPER: u8 = 1;

@@ -103,7 +103,7 @@ pub enum Map {
 }
 
 impl Map {
-    /// Both maps.
+    /// Both maps, 2.2 first.
     pub const ALL: [Self; 2] = [Self::V22, Self::V21];
 
     /// The version, as the maker names it.
@@ -115,7 +115,7 @@ impl Map {
         }
     }
 
-    /// The rows of the map.
+    /// The rows of the map, by rising address.
     #[must_use]
     pub const fn rows(self) -> &'static [Register] {
         match self {

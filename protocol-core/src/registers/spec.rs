@@ -22,7 +22,7 @@ pub enum Region {
 pub enum Access {
     /// Can be read; a write has no effect.
     ReadOnly,
-    /// Can be read and written.
+    /// Can be read and written, in EEPROM only while its lock is open.
     ReadWrite,
     /// Reserved by the maker: a write in this map has no effect. Reads 0, unless the other map writes the register.
     Reserved,
@@ -43,15 +43,15 @@ pub struct Register {
     pub count: u8,
     /// Is the run one value per joint?
     pub per_joint: bool,
-    /// The memory region.
+    /// Where the value is kept, and for how long.
     pub region: Region,
-    /// The access of a host.
+    /// Whether a write by a host has an effect.
     pub access: Access,
-    /// The valid values.
+    /// The valid values, also of defaults, and the width of a value.
     pub range: Range,
     /// The raw values after power-up or, in EEPROM, of a new arm. A per-joint row has one for each joint.
     pub defaults: [u16; JOINTS],
-    /// The unit of the value.
+    /// The unit of a raw value; [`Unit::None`] for a plain number, a code or bits.
     pub unit: Unit,
 }
 
@@ -170,7 +170,7 @@ impl Register {
         if self.per_joint { self.address.wrapping_add(distance) } else { self.address }
     }
 
-    /// Does the run hold `address`?
+    /// Is `address` inside the run? Also true for the second byte of a value.
     #[must_use]
     pub const fn holds(&self, address: u8) -> bool {
         address.wrapping_sub(self.address) < self.count

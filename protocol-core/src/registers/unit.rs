@@ -5,7 +5,7 @@
 pub enum Unit {
     /// A plain number, a code, or bits.
     None,
-    /// Degrees of a joint.
+    /// Whole degrees of an angle or an offset of a joint.
     Degree,
     /// Hundredths of a degree.
     Centidegree,
@@ -13,9 +13,9 @@ pub enum Unit {
     DecidegreePerSecond,
     /// Tenths of a percent of the stall torque.
     PermilleOfStall,
-    /// Percent of the stall torque.
+    /// Percent of the stall torque, for the limits of the push ([D27](crate::decisions#d27)).
     PercentOfStall,
-    /// Milliseconds.
+    /// Milliseconds, for the period of set-points ([D23](crate::decisions#d23)).
     Millisecond,
     /// Hundredths of a second.
     Centisecond,
@@ -23,11 +23,11 @@ pub enum Unit {
     SpeedStep,
     /// Tenths of a second.
     Decisecond,
-    /// Hertz.
+    /// Reports per second.
     Hertz,
     /// Tenths of a volt.
     Decivolt,
-    /// Degrees Celsius.
+    /// Degrees Celsius, for the hottest servo.
     Celsius,
     /// Tenths of a firmware version: 30 is 3.0.
     VersionTenths,

@@ -30,7 +30,6 @@ impl Crc {
     /// The state before the first byte: times x^16 it is the start value 0xFFFF, which has even parity.
     pub(super) const START: Self = Self { sum: 0xD556_0000, parity: 0 };
 
-    /// Appends bytes.
     #[inline(never)]
     pub(super) fn bytes(self, bytes: &[u8]) -> Self {
         // Two words per iteration halve the cost of the loop itself.
@@ -45,17 +44,14 @@ impl Crc {
         rest.iter().fold(crc, |crc, &byte| crc.byte(byte))
     }
 
-    /// Appends four bytes.
     pub(super) const fn word(self, bytes: [u8; 4]) -> Self {
         self.step(u32::from_le_bytes(bytes), 32)
     }
 
-    /// Appends two bytes.
     pub(super) const fn half(self, bytes: [u8; 2]) -> Self {
         self.step(u16::from_le_bytes(bytes) as u32, 16)
     }
 
-    /// Appends one byte.
     pub(super) const fn byte(self, byte: u8) -> Self {
         self.step(byte as u32, 8)
     }

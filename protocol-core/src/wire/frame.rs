@@ -11,14 +11,14 @@ use super::crc::Crc;
 pub const HEADER: [u8; 2] = [0xAA, 0x77];
 /// Bytes before the data: header, function, address, count.
 pub const PREFIX_LENGTH: usize = 5;
-/// Bytes of the checksum.
+/// Bytes of the CRC at the end of a frame, low byte first.
 pub const CRC_LENGTH: usize = 2;
 /// The shortest frame: one without data.
 pub const MIN_LENGTH: usize = PREFIX_LENGTH + CRC_LENGTH;
 /// The longest frame: 255 bytes of data with prefix and CRC ([D1](crate::decisions#d1)).
 pub const MAX_LENGTH: usize = PREFIX_LENGTH + 255 + CRC_LENGTH;
 
-/// An encoded frame.
+/// An encoded frame of either direction; the longest one fits.
 pub type FrameBuffer = heapless::Vec<u8, MAX_LENGTH>;
 
 /// The function code of a frame.
@@ -123,7 +123,7 @@ pub enum Defect {
 /// What [`parse`] finds at the beginning of its input. Lengths count bytes from there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ParseOutcome<'a> {
-    /// A frame and its length.
+    /// A frame with a correct CRC and a valid range, and its length.
     Complete(Frame<'a>, usize),
     /// A rejected frame and its length.
     Defective(Defect, usize),

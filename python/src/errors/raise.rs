@@ -28,7 +28,6 @@ const GUARD_HINTS: [&str; 2] = [
 
 /// A failure of the library as an exception.
 pub(crate) trait Raise {
-    /// The exception.
     fn raise(&self, py: Python<'_>) -> PyErr;
 }
 

@@ -63,7 +63,6 @@ impl From<FormatName> for Format {
     }
 }
 
-/// The result of `convert`.
 #[derive(Debug, Serialize)]
 struct Converted {
     file: String,

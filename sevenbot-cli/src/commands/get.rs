@@ -83,7 +83,6 @@ pub(crate) fn not_served(arm: &Arm, address: u8) -> CommandError {
     CommandError::Arm(format!("the arm's firmware {version} does not have register {address}, {name}"))
 }
 
-/// Registers for printing.
 #[derive(Debug, Serialize)]
 pub(crate) struct RegisterList {
     registers: Vec<RegisterLine>,

@@ -69,7 +69,6 @@ pub(crate) struct PlayArgs {
     guard: GuardArgs,
 }
 
-/// The result of `play`.
 #[derive(Debug, Serialize)]
 struct Played {
     times: u32,

@@ -299,7 +299,6 @@ fn targets(goals: &[PoseArg], arm: &mut Arm) -> Result<FineTargets, CommandError
     Ok(targets)
 }
 
-/// Positions of the joints.
 #[derive(Serialize)]
 pub(crate) struct Positions {
     pub(crate) positions_degrees: [u8; 7],

@@ -55,7 +55,6 @@ pub(crate) struct RecoverArgs {
 
 /// Time limit until servos answer after their supply was switched on.
 const ANSWER_TIMEOUT: Duration = Duration::from_secs(3);
-/// Time limit for the recovery.
 const RECOVERY_TIMEOUT: Duration = Duration::from_secs(6);
 /// The arm has recovered after this time without a problem. It is longer than the second after which a joint counts as blocked
 /// (D27).
@@ -64,7 +63,6 @@ const POLL_PERIOD: Duration = Duration::from_millis(100);
 /// How long the motors are off to end an overload (forceless, then servo).
 const OFF_TIME: Duration = Duration::from_millis(500);
 
-/// The result of `recover`.
 #[derive(Serialize)]
 struct Recovered {
     recovered: bool,

@@ -80,7 +80,6 @@ struct JointLine {
     is_bad: bool,
 }
 
-/// A problem and its remedy.
 #[derive(Debug, Serialize)]
 pub(crate) struct ProblemText {
     kind: &'static str,

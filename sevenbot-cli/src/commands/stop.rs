@@ -59,7 +59,6 @@ fn positions(joints: &JointSnapshot) -> [u8; 7] {
     if joints.is_driven() { joints.targets() } else { joints.positions() }
 }
 
-/// An arm that was stopped.
 #[derive(Serialize)]
 struct Stopped {
     port: String,

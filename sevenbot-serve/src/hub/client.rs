@@ -44,19 +44,18 @@ pub enum Event {
     NoReply {
         /// The first register.
         address: u8,
-        /// How many registers.
+        /// How many registers the read asked for.
         count: u8,
     },
     /// A report that the client's own registers ask for.
     Report {
-        /// The stream.
+        /// Tells which registers the values are from.
         stream: ReportKind,
         /// The values of the stream's registers.
         values: Vec<u8>,
     },
 }
 
-/// A request that waits.
 #[derive(Debug)]
 pub(crate) struct Waiting {
     pub(crate) request: WholeRequest,
@@ -65,7 +64,6 @@ pub(crate) struct Waiting {
     pub(crate) since: Instant,
 }
 
-/// One client.
 #[derive(Debug, Default)]
 pub(crate) struct Client {
     pub(crate) waiting: VecDeque<Waiting>,

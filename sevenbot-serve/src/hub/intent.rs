@@ -18,7 +18,6 @@ pub(crate) enum Intent {
     Setting,
     /// It switches something: the motors on, the effector, the pump.
     Switch,
-    /// It moves joints.
     Motion,
     /// It holds joints: their targets are the positions that its client has read.
     Hold,
@@ -71,7 +70,6 @@ impl Intent {
         matches!(self, Self::Stop | Self::MotorsOff)
     }
 
-    /// Does a stop end it?
     pub(crate) const fn is_ended_by_stop(self) -> bool {
         matches!(self, Self::Motion | Self::Switch)
     }

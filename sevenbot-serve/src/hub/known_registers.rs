@@ -64,12 +64,10 @@ impl KnownRegisters {
         (SPEED.address..).zip(speeds).for_each(|(address, &speed)| self.0.set(address, speed));
     }
 
-    /// A register of one byte.
     pub(crate) fn byte(&self, address: u8) -> u8 {
         self.0.get(address)
     }
 
-    /// A register of two bytes.
     pub(crate) fn word(&self, address: u8) -> u16 {
         self.0.word(address)
     }

@@ -40,7 +40,6 @@ const REPORTS: &[Span] =
 /// The owner of a read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Owner {
-    /// A client.
     Client(ClientId),
     /// The sampler.
     Sample(ReportKind),

@@ -94,7 +94,6 @@ pub struct Hub {
     presence: Presence,
     sampler: Sampler,
     watchdog: ClientWatchdog,
-    /// The hold in progress.
     hold: Option<ArmHold>,
     /// The outcome of the last hold; `None`: it has not ended, or there was none.
     hold_outcome: Option<HoldOutcome>,
@@ -142,7 +141,7 @@ impl Hub {
         }
     }
 
-    /// Adds a client.
+    /// Adds a client. Its reads wait until [`Hub::set_can_receive`] allows replies.
     pub fn connect(&mut self) -> ClientId {
         let id = self.next_id;
         self.next_id = id.next();
@@ -242,7 +241,7 @@ impl Hub {
         }
     }
 
-    /// Bytes for the arm.
+    /// The bytes that wait for the arm's port. Report those that were sent with [`Hub::sent_to_arm`].
     #[must_use]
     pub fn to_arm(&self) -> &[u8] {
         self.line.output()

@@ -11,7 +11,7 @@ pub enum WholeRequest {
     Read {
         /// The first register.
         address: u8,
-        /// How many registers.
+        /// How many registers, one byte each.
         count: u8,
     },
     /// Writes registers from `address` on.

@@ -17,7 +17,6 @@ pub(crate) struct Timer {
 }
 
 impl Timer {
-    /// Switched off.
     pub(crate) const OFF: Self = Self { period: Duration::ZERO, due: Instant::FAR_FUTURE };
 
     /// Sets the frequency in Hz; 0 switches the timer off. An unchanged frequency keeps the due time.

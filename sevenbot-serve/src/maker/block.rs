@@ -47,7 +47,6 @@ impl Block {
         Ok(values)
     }
 
-    /// Number of registers.
     fn count(self) -> usize {
         let tip = TIP_POSITION.count + TOOL_DIRECTION.count;
         usize::from(match self {

@@ -69,7 +69,7 @@ impl MakerClient {
         }
     }
 
-    /// The id in the hub.
+    /// The id of this client in the hub, for example for [`Hub::leave`].
     #[must_use]
     pub const fn id(&self) -> ClientId {
         self.id
@@ -150,7 +150,7 @@ impl MakerClient {
         }
     }
 
-    /// The next answer.
+    /// Takes the oldest answer for the client, as JSON; `None` if no answer waits.
     pub fn take_answer(&mut self) -> Option<String> {
         self.answers.pop_front()
     }

@@ -13,20 +13,20 @@ use super::block::Block;
 pub enum MakerCommand {
     /// Asks whether the server answers.
     Ping,
-    /// Reads registers.
+    /// Reads registers, for `read`.
     Read {
         /// The first register.
         address: u8,
-        /// How many registers.
+        /// The number of registers, 1 to 255.
         count: u8,
     },
-    /// Writes registers.
+    /// Writes registers, for `write`, `angle`, `angles`, `speed`, `time`, `status` and `vacuum`.
     Write {
         /// The first register.
         address: u8,
         /// One byte per register.
         values: Vec<u8>,
-        /// The text of the answer.
+        /// The text of the answer if the hub takes the write.
         done: &'static str,
     },
     /// Writes a block of registers for which the arm finds joint angles ([M7](protocol_core::decisions#m7)).

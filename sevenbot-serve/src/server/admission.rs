@@ -27,7 +27,6 @@ const MOST_ADDRESSES: usize = 256;
 /// A place of a client, or of any connection.
 pub(super) type Place = OwnedSemaphorePermit;
 
-/// How many places there are.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Places {
     pub(super) clients: usize,

@@ -30,7 +30,6 @@ pub(super) enum Protocol {
     Maker {
         is_browser: bool,
     },
-    /// The messages of a class.
     Class(Role),
     /// Frames for the class's real arm, during this lease.
     LentArm(LeaseId),
@@ -44,7 +43,6 @@ impl Protocol {
     }
 }
 
-/// The answer to a request.
 #[derive(Debug)]
 pub(super) enum Answer {
     /// A whole answer. The connection is closed after it.
@@ -97,7 +95,6 @@ fn header<'a, B>(request: &'a Request<B>, name: &str) -> Option<&'a str> {
     request.headers().get(name)?.to_str().ok()
 }
 
-/// An answer that refuses.
 pub(super) fn refusal(status: StatusCode, text: &'static str) -> Response<Full<Bytes>> {
     response(status, "text/plain; charset=utf-8", Bytes::from_static(text.as_bytes()))
 }

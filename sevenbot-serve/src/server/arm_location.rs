@@ -13,7 +13,7 @@ pub enum ArmLocation {
     /// First this port. When the arm was lost, also the ports that were not there before; then it has to be the same
     /// arm, by its chip id.
     Search {
-        /// The port at the start.
+        /// The only port that is tried until the arm was found once.
         first: PathBuf,
         /// Lists all serial ports.
         list: fn() -> Vec<PathBuf>,

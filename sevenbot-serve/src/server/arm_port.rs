@@ -119,7 +119,6 @@ impl ArmPort {
         hub.is_silent() && self.search.is_none()
     }
 
-    /// Sends the hub's bytes.
     fn send(&mut self, hub: &mut Hub, now: Instant, notify: &mut dyn FnMut(Notice)) {
         let ArmPortState::Open(port, ..) = &self.state else { return };
         if hub.to_arm().is_empty() {

@@ -17,7 +17,6 @@ const PIECE: usize = 512;
 /// TLS.
 const FIRST_BYTE: u8 = 0xAA;
 
-/// A stream of bytes.
 pub(super) trait ByteStream: AsyncRead + AsyncWrite + Unpin + Send {}
 
 impl<S: AsyncRead + AsyncWrite + Unpin + Send> ByteStream for S {}

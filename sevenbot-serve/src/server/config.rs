@@ -24,15 +24,15 @@ pub struct ServerConfig {
     pub tcp: Option<SocketAddr>,
     /// Address for clients of the maker's WebSocket.
     pub web_socket: Option<SocketAddr>,
-    /// The page for a browser.
+    /// The page for a browser of this computer, for `sevenbot view`; `None`: there is none.
     pub page: Option<PageConfig>,
-    /// The page for a class.
+    /// The page for a class, and the teacher's screen; `None`: there is no class.
     pub class: Option<ClassConfig>,
     /// Who may connect over TCP and the maker's WebSocket.
     pub access: AccessPolicy,
     /// The certificate for TCP, the maker's WebSocket and the class; `None`: they are not encrypted.
     pub tls: Option<TlsFiles>,
-    /// What clients may do.
+    /// May clients write, and may only one at a time move the arm?
     pub options: HubOptions,
 }
 

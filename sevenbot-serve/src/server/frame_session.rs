@@ -46,7 +46,6 @@ impl FrameSession {
         });
     }
 
-    /// May more bytes be put?
     pub(super) fn has_room(&self) -> bool {
         self.input.is_empty()
     }

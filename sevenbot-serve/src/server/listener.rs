@@ -24,7 +24,6 @@ const USER_TIMEOUT: Duration = Duration::from_secs(60);
 /// Pause after a failed accept, for example because too many files are open.
 pub(super) const AFTER_ERROR: Duration = Duration::from_millis(100);
 
-/// Opens a TCP port.
 pub(super) fn open_tcp(address: SocketAddr) -> Result<TcpListener, StartError> {
     let failed = |cause: io::Error| match cause.kind() {
         io::ErrorKind::AddrInUse => StartError::InUse(address),

@@ -14,7 +14,7 @@ pub enum Notice {
     ArmFound(PathBuf),
     /// The port cannot be opened, or was lost. The server tries it again twice a second.
     ArmLost {
-        /// The port.
+        /// The port that failed. With a search the server may try another one next.
         port: PathBuf,
         /// The error of the port, as text.
         reason: String,
@@ -23,19 +23,19 @@ pub enum Notice {
     ArmSilent(PathBuf),
     /// The server held the arm by itself, and that failed.
     HoldFailed(HoldOutcome),
-    /// A client was refused.
+    /// A client of the network was refused. At most five of these notices come in a second.
     Refused {
-        /// Its address.
+        /// The address and port from which the client connected.
         peer: Option<SocketAddr>,
-        /// Why it was refused.
+        /// What was wrong with the client, or that there was no room for it.
         reason: RefusalReason,
     },
 }
 
-/// Why a client was refused.
+/// Why the server refuses a client, for [`Notice::Refused`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RefusalReason {
-    /// Its token is wrong.
+    /// Its token, or its class code, is wrong or missing.
     WrongToken,
     /// There are too many clients, or too many connections of its address wait for the check of their tokens.
     Full,

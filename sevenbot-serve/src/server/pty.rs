@@ -18,7 +18,6 @@ use super::start_error::StartError;
 /// Bytes that are read at once: the size of the kernel's read buffer.
 const PIECE: usize = 4_096;
 
-/// A pseudo-terminal and its link.
 #[derive(Debug)]
 pub(super) struct PtyPort {
     pty: Pty,

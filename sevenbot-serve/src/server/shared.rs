@@ -109,7 +109,6 @@ impl Shared {
         lock(&self.clients).remove(&id);
     }
 
-    /// Ends when clients did something.
     pub(super) async fn clients_acted(&self) {
         self.arm.notified().await;
     }

@@ -17,7 +17,7 @@ use crate::token::is_equal;
 /// The path of the WebSocket with frames.
 const FRAMES: &str = "/frames";
 
-/// A page to serve.
+/// How the server serves the page to a browser of this computer.
 #[derive(Clone)]
 pub struct PageConfig {
     /// Where to listen. It should be an address of the loopback interface.
@@ -28,10 +28,10 @@ pub struct PageConfig {
     pub files: PageFiles,
 }
 
-/// A class to serve.
+/// How the server serves a class: its page, and the teacher's screen.
 #[derive(Clone)]
 pub struct ClassConfig {
-    /// Where to listen.
+    /// Where to listen. For port 0 the system chooses one, see [`class_address`](super::Server::class_address).
     pub address: SocketAddr,
     /// The files of the page, and of the teacher's screen at `teacher.html`.
     pub files: PageFiles,
@@ -62,7 +62,6 @@ impl fmt::Debug for PageConfig {
 /// What a port serves.
 #[derive(Clone)]
 pub(super) enum Site {
-    /// The page.
     Page(PageSite),
     /// The maker's WebSocket.
     Maker(AccessPolicy),
@@ -79,7 +78,6 @@ pub(super) struct PageSite {
 }
 
 impl Site {
-    /// Answers a request.
     pub(super) fn answer<B>(&self, request: &Request<B>) -> Answer {
         if request.method() != Method::GET {
             return Answer::Whole(refusal(StatusCode::BAD_REQUEST, "This is no GET request of HTTP/1.1.\n"));

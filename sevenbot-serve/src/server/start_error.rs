@@ -10,11 +10,11 @@ use tty_ports::symlink::SymlinkError;
 /// Why the server does not start. Each message says what to do.
 #[derive(Debug, thiserror::Error)]
 pub enum StartError {
-    /// A link cannot be created.
+    /// The link to a pseudo-terminal cannot be created.
     #[cfg(target_os = "linux")]
     #[error("--pty {0}")]
     Symlink(#[from] SymlinkError),
-    /// The system has no pseudo-terminal.
+    /// The system gives no pseudo-terminal, for example because too many files are open.
     #[cfg(target_os = "linux")]
     #[error("no pseudo-terminal: {0}: is /dev/pts mounted, and does 'ulimit -n' allow more files?")]
     Pty(io::Error),
@@ -32,9 +32,9 @@ pub enum StartError {
     /// The local socket cannot be used.
     #[error("{}: {cause}: choose another path for the socket", path.display())]
     Socket {
-        /// The path.
+        /// The path at which the server was to listen.
         path: PathBuf,
-        /// The reason.
+        /// Why the socket cannot be there, in words of the system or of the server.
         cause: io::Error,
     },
     /// The certificate or its key cannot be used.
@@ -46,18 +46,18 @@ pub enum StartError {
     Certificate {
         /// The option with the name of the file.
         option: &'static str,
-        /// The file.
+        /// The certificate or the key.
         path: PathBuf,
-        /// The reason.
+        /// Why the file cannot be read, or why TLS does not accept it.
         cause: io::Error,
     },
     /// The operating system refuses a resource that every server needs.
     #[error("the operating system refuses: {0}")]
     System(io::Error),
-    /// The address cannot be used.
+    /// The server cannot listen there, for another reason than [`StartError::InUse`].
     #[error("{address}: {cause}: choose an address of this computer")]
     Address {
-        /// The address.
+        /// The address and port at which the server was to listen.
         address: SocketAddr,
         /// The system's reason.
         cause: io::Error,

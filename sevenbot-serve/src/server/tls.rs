@@ -16,7 +16,7 @@ use super::start_error::StartError;
 pub struct TlsFiles {
     /// The certificate, followed by those that sign it.
     pub certificate: PathBuf,
-    /// The private key.
+    /// The private key that belongs to the certificate.
     pub key: PathBuf,
 }
 

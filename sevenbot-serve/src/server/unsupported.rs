@@ -7,7 +7,6 @@ use std::sync::Arc;
 use super::shared::Shared;
 use super::start_error::StartError;
 
-/// A pseudo-terminal with a link.
 #[derive(Debug)]
 #[cfg(not(target_os = "linux"))]
 pub(super) enum PtyPort {}
@@ -23,7 +22,6 @@ impl PtyPort {
     }
 }
 
-/// A Unix socket.
 #[derive(Debug)]
 #[cfg(not(unix))]
 pub(super) enum LocalSocket {}

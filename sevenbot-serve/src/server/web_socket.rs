@@ -72,7 +72,6 @@ impl<S: AsyncWrite + Unpin> AsyncWrite for Metered<S> {
 type Socket<S> = WebSocketStream<Metered<S>>;
 type Sink<S> = SplitSink<Socket<S>, Message>;
 
-/// The messages of a client.
 struct Messages<S> {
     stream: SplitStream<Socket<S>>,
     unfinished: Arc<AtomicUsize>,
@@ -152,7 +151,6 @@ pub(super) trait Session {
     /// `can_send` one.
     fn advance(&mut self, can_send: bool) -> Option<Message>;
 
-    /// May another message be put?
     fn has_room(&self) -> bool;
 
     /// Has the client sent more than it may, so that its connection ends?

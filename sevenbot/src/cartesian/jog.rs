@@ -11,7 +11,7 @@ use super::refusal::TipRefusal;
 use super::target::TipTarget;
 use crate::units::Angle;
 
-/// The axes of a step.
+/// The axes in which a step of a jog is given.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum JogAxes {
     /// The axes of the base: x to the right, y forward, z up.
@@ -41,7 +41,7 @@ pub struct Jog {
     pub targets: [Angle; 7],
 }
 
-/// Why a step is refused.
+/// Why [`Jog::step`] refuses a step.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum JogRefusal {
     /// The end of the step is out of reach, or the guard does not allow it.

@@ -40,13 +40,13 @@ const IN_LINE: f64 = 90.0;
 /// A straight line of the tip that the arm can follow.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StraightLine {
-    /// The pose at the start.
+    /// The pose at the start, from the targets of the arm at rest.
     pub start: TipPose,
     /// The length of the line, in millimetres.
     pub length_mm: f64,
     /// The duration of the line, without the turn of joint 4 before it.
     pub duration: Duration,
-    /// The movement of the joints.
+    /// The targets over the time of the line, as a recording to play.
     pub recording: Recording,
     /// The largest distance of the tip from the line, in millimetres. Rounded angles cause it.
     pub deviation_mm: f64,

@@ -166,7 +166,6 @@ impl fmt::Display for PointText {
 #[derive(Clone, Copy, Debug)]
 pub struct DirectionText(pub Vector);
 
-/// Directions with a name.
 const NAMED: [(&str, [f64; 3]); 6] = [
     ("straight down", [0.0, 0.0, -1.0]),
     ("straight up", [0.0, 0.0, 1.0]),

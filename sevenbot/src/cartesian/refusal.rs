@@ -88,7 +88,7 @@ impl fmt::Display for GuardedTip {
 /// Why the arm does not reach a position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Unreachable {
-    /// The reason.
+    /// Why the inverse kinematics has no solution; [`Self::reason`] says it to a user.
     pub why: NoSolution,
     /// The requested tip, in millimetres.
     pub tip: Vector,

@@ -24,7 +24,7 @@ use crate::status_block::StatusBlock;
 pub enum MismatchCause {
     /// The table has no register there.
     NoRegister,
-    /// The register is read only.
+    /// The table allows no write to the register.
     ReadOnly,
     /// The maker reserves the register.
     Reserved,

@@ -20,9 +20,9 @@ const AT_TARGET_DEGREES: f64 = 3.0;
 /// One joint at one instant. A value is `None` where the firmware does not tell it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointHealth {
-    /// The joint.
+    /// The joint that the other values are about.
     pub joint: Joint,
-    /// The target.
+    /// The target, in whole degrees from firmware without the extended block.
     pub target: FineAngle,
     /// The measured position; of a silent joint, the last one. `None` if the joint was never measured. Firmware without the
     /// extended block gives whole degrees, and 0 for a joint that was never measured.

@@ -31,7 +31,6 @@ pub(crate) use problem::{ALARM_BITS, FAULT_BITS};
 pub use problem::{Problem, ProblemKind, remedies, sentences};
 pub use watch::{MoveFault, MoveWatch};
 
-/// The bits of all joints.
 const ALL_JOINTS: u8 = (1 << JOINTS) - 1;
 
 /// The health of an arm. A value is `None` where the firmware does not tell it.

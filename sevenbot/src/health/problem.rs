@@ -15,7 +15,7 @@ pub enum ProblemKind {
     /// The supply of the servos was lost, and the controller keeps the motors off
     /// ([D29](protocol_core::decisions#d29)).
     SupplyLost,
-    /// No servo answers.
+    /// No servo answers, as when the emergency stop is open.
     NoServoAnswers,
     /// The joint's servo does not answer.
     NoAnswer,
@@ -39,7 +39,7 @@ pub enum ProblemKind {
     WatchdogRestart,
     /// The controller restarted after a drop of its supply.
     BrownOutRestart,
-    /// The controller's crystal failed.
+    /// The controller's crystal failed, so its clock is inexact.
     CrystalFailed,
     /// The controller's receive buffer was full.
     ReceiveOverrun,
@@ -52,7 +52,6 @@ struct ProblemTexts {
     name: &'static str,
     /// A sentence without its full stop. For a joint's problem, the part after "joint 2 ".
     words: &'static str,
-    /// What to do.
     remedy: &'static str,
 }
 
@@ -215,7 +214,7 @@ impl ProblemKind {
         self.texts().map_or("", |texts| texts.words)
     }
 
-    /// What to do.
+    /// What a user can do about it: a sentence without its capital letter and its full stop.
     #[must_use]
     pub fn remedy(self) -> &'static str {
         self.texts().map_or("", |texts| texts.remedy)
@@ -264,7 +263,7 @@ impl ProblemKind {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Problem {
-    /// What is wrong.
+    /// What is wrong, with its words and its remedy.
     pub kind: ProblemKind,
     /// The joint; `None`: a problem of the whole arm.
     pub joint: Option<Joint>,

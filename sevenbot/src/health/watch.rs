@@ -22,7 +22,6 @@ use host_link::{Snapshot, Span};
 
 /// The registers of a check: set-point period, protection block, status block.
 pub(super) const REGISTERS: Span = Span::between(&SET_POINT_PERIOD, &SERVO_TEMPERATURE);
-/// Motor state and effector.
 pub(super) const STATE_REGISTERS: Span = Span::between(&MOTOR_STATE, &EFFECTOR_TYPE);
 /// The shortest time between two questions.
 const POLL_PERIOD: Duration = Duration::from_millis(100);
@@ -75,7 +74,7 @@ pub enum MoveFault {
 /// ```
 #[derive(Clone, Debug)]
 pub struct MoveWatch {
-    /// The driven joints, as [`Joint::bit`](crate::Joint::bit)s.
+    /// The watched joints, as [`Joint::bit`](crate::Joint::bit)s.
     joints: u8,
     /// Do the motors have to drive the joints? If not, it is enough that the positions are measured.
     needs_motors: bool,

@@ -11,7 +11,6 @@ use crate::status_block::StatusBlock;
 use host_link::sharing::DROOP;
 use host_link::{Snapshot, Span, keep_limits};
 
-/// A target that was written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct SentTarget {
     /// The raw value of the register.

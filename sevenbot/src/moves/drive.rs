@@ -13,7 +13,6 @@ pub(super) const POLL_PERIOD: Duration = Duration::from_millis(20);
 
 /// Where the steps of a run go.
 pub(super) trait StepSink {
-    /// The arm of the run.
     fn arm(&mut self) -> &mut Arm;
 
     /// Sends a point or a frame. A stream also checks whether the arm follows.

@@ -84,7 +84,7 @@ pub enum MoveError {
     /// The first point of a stream or a recording is too far away. Nothing was moved.
     #[error(transparent)]
     StartTooFar(#[from] StartTooFar),
-    /// A stream of points failed.
+    /// The arm's firmware takes no stream of set-points.
     #[error(transparent)]
     Stream(StreamError),
     /// An exchange with the arm failed.

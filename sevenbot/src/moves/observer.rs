@@ -16,7 +16,7 @@ pub enum Stage {
 }
 
 impl Stage {
-    /// The unit of the progress.
+    /// The unit in [`Observer::progress`]: `degrees` or `points`.
     #[must_use]
     pub const fn unit(self) -> &'static str {
         match self {

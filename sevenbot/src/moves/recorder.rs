@@ -14,7 +14,7 @@ use host_link::Span;
 /// Without a report for this time, the arm has stopped reporting. The lowest rate is 1 Hz.
 const REPORT_TIMEOUT: Duration = Duration::from_secs(3);
 
-/// A measured pose.
+/// A pose from one report of the arm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RecordedPose {
     /// The time of the measurement, since the first pose.

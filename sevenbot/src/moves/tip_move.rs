@@ -48,7 +48,7 @@ pub enum GuardedMoveError {
     /// The guard does not allow the way.
     #[error(transparent)]
     Guarded(#[from] PathBreach),
-    /// An exchange failed.
+    /// An exchange with the arm failed, before anything was moved.
     #[error(transparent)]
     Exchange(#[from] Error),
 }
@@ -92,7 +92,7 @@ impl Arm {
 /// Where a straight line starts: at the present targets, in the finest resolution that the arm has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LineStart {
-    /// The targets of all joints.
+    /// The targets, joint 1 first.
     pub targets: [FineAngle; 7],
     /// The resolution of the arm's targets.
     pub resolution: TargetResolution,
@@ -106,12 +106,12 @@ pub enum LineStartError {
     /// The target of a joint is no base for a step.
     #[error("the start of the line is not known: joint {joint}: {reason}; nothing was moved")]
     Unknown {
-        /// The number of the joint.
+        /// The number of the joint, from 1.
         joint: u8,
-        /// The reason.
+        /// Why its target is no base for a step.
         reason: StepBaseError,
     },
-    /// An exchange failed.
+    /// An exchange with the arm failed. Nothing was moved.
     #[error(transparent)]
     Exchange(#[from] Error),
 }

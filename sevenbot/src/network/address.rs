@@ -17,7 +17,7 @@ pub enum Address {
     Tcp(String),
     /// `tls://HOST:PORT`: the connection is encrypted, and the server shows a certificate for this host.
     Tls(String),
-    /// `unix:PATH`.
+    /// `unix:PATH` or `unix://PATH`: the Unix socket of a server.
     Unix(PathBuf),
     /// `sevenbot://NAME`: the server that was started with this name.
     Name(String),

@@ -13,10 +13,10 @@ const FILE: &str = "server";
 /// The extension of a server's socket.
 const SOCKET: &str = "sock";
 
-/// A server of this user.
+/// A server of this user on this computer, as its file describes it.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct LocalServer {
-    /// Its Unix socket.
+    /// The path of its Unix socket, beside its file.
     pub socket: PathBuf,
     /// The serial port of its arm.
     pub port: PathBuf,

@@ -18,9 +18,9 @@ const ANSWER_TIME: Duration = Duration::from_millis(1_500);
 /// An arm that a server of the network announces.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Announced {
-    /// Its name.
+    /// The name of the server, as in `sevenbot://NAME`.
     pub name: String,
-    /// Its address over TCP.
+    /// Its address over TCP: of IPv4 if it has one that is no loopback address.
     pub address: SocketAddr,
     /// Does the server require TLS?
     pub is_encrypted: bool,

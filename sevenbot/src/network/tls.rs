@@ -10,7 +10,6 @@ use rustls::{ClientConfig, ClientConnection, RootCertStore, StreamOwned};
 
 use super::address::CERTIFICATE_VARIABLE;
 
-/// An encrypted connection.
 pub(super) type TlsStream = StreamOwned<ClientConnection, TcpStream>;
 
 /// Encrypts a connection. The certificate of the server has to be for this host, and to be in the file of

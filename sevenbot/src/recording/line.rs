@@ -55,7 +55,7 @@ pub enum LineError {
     /// The time is not later than the time of the previous moment.
     #[error("the time {} s is not later than {} s, the one before", time.as_secs_f64(), before.as_secs_f64())]
     NotLater {
-        /// The time of this moment.
+        /// The time of this moment, since the start of the recording.
         time: Duration,
         /// The time of the moment before.
         before: Duration,
@@ -87,7 +87,7 @@ pub enum LineError {
         Speed::MAXIMUM.degrees_per_second()
     )]
     TooFast {
-        /// The joint.
+        /// The joint that cannot follow.
         joint: Joint,
         /// The necessary speed in degrees/s.
         degrees_per_second: f64,

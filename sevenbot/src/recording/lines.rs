@@ -50,7 +50,7 @@ impl RecordingLines {
         Some(moment.line(self.version) + "\n")
     }
 
-    /// The number of moments.
+    /// The number of moments that [`Self::add`] took.
     #[must_use]
     pub const fn count(&self) -> u64 {
         self.count

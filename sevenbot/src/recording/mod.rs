@@ -66,15 +66,15 @@ pub enum RecordingError {
     /// The version of the format is neither 1 nor 2.
     #[error("the recording has version `{0}`; this program reads versions 1 and 2")]
     OtherVersion(String),
-    /// There are no moments.
+    /// There is no moment; a recording needs at least one.
     #[error("the recording contains no movement")]
     Empty,
-    /// A line is refused.
+    /// A line of the text is refused, or a moment of [`Recording::of_moments`].
     #[error("line {number}: {cause}")]
     Line {
         /// The line number, from 1.
         number: usize,
-        /// The reason.
+        /// The wrong field or time, or the joint that would be too fast.
         cause: LineError,
     },
 }
@@ -99,7 +99,7 @@ impl Recording {
         Self::in_order((1..).zip(moments).map(|(number, moment)| (number, line::checked(moment))))
     }
 
-    /// From moments with their numbers.
+    /// From moments with their numbers. Each must be later than the one before.
     fn in_order(
         numbered: impl Iterator<Item = (usize, Result<Moment, LineError>)>,
     ) -> Result<Self, RecordingError> {

@@ -21,10 +21,10 @@ const IDLE_TIME: Duration = Duration::from_millis(25);
 /// longer anyway, but a UART on the bus may not.
 const GUARD_TIME: Duration = Duration::from_micros(100);
 
-/// Timeout and attempts.
+/// How long to wait for the answer of a servo, and how often to ask.
 #[derive(Clone, Copy, Debug)]
 pub struct BusOptions {
-    /// The timeout of one attempt.
+    /// How long one attempt waits for the answer.
     pub reply_timeout: Duration,
     /// The number of attempts, at least one.
     pub attempts: u32,
@@ -36,7 +36,7 @@ impl Default for BusOptions {
     }
 }
 
-/// The answer of a servo.
+/// The answer of a servo to a read.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ServoReply {
     /// The error bits: [`motion_core::servo_bus::frame::error`].
@@ -74,7 +74,7 @@ impl BusMaster {
         Ok(Self::with_line(Box::new(OpenPort::open(path, baud)?), options))
     }
 
-    /// A master on any line.
+    /// A master on a line that is open, such as a simulated one.
     #[must_use]
     pub fn with_line(line: Box<dyn ServoLine>, options: BusOptions) -> Self {
         Self {
@@ -95,7 +95,7 @@ impl BusMaster {
         self.has_echo
     }
 
-    /// Timeout and attempts.
+    /// The options with which the bus was opened.
     #[must_use]
     pub const fn options(&self) -> BusOptions {
         self.options

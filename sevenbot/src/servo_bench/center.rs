@@ -55,7 +55,7 @@ pub enum CenterError {
     /// The servo reports errors. Nothing was written.
     #[error("the servo reports: {}", error_words(*errors))]
     ReportsErrors {
-        /// The error bits.
+        /// The error bits, as [`error_words`] names them.
         errors: u8,
     },
     /// The servo reports a position outside 0 to 1023 counts.
@@ -68,16 +68,16 @@ pub enum CenterError {
         position: u16,
         /// The load in 0.1 % of the stall torque.
         load: i16,
-        /// The error bits.
+        /// The error bits, as [`error_words`] names them.
         errors: u8,
     },
-    /// The servo makes no progress.
+    /// The servo has come no nearer to the middle for [`CenterOptions::stall`].
     #[error("stopped at {position} counts: the servo makes no progress")]
     Stalled {
         /// The position in counts.
         position: u16,
     },
-    /// The user interrupted the move.
+    /// The caller ended the move: `on_reading` returned `false`.
     #[error("interrupted")]
     Interrupted,
     /// An exchange with the servo failed.

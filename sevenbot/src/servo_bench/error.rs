@@ -10,19 +10,19 @@ pub enum ServoError {
     /// No attempt brought an accepted answer.
     #[error("servo {id} does not answer ({attempts} tries of {} ms): {received}", waited.as_millis())]
     NoAnswer {
-        /// The id of the servo.
+        /// The id that was asked.
         id: u8,
-        /// The number of attempts.
+        /// The number of attempts, at least 1.
         attempts: u32,
         /// The timeout of each attempt.
         waited: Duration,
-        /// What was received instead.
+        /// What was received instead, in all attempts together.
         received: ReceiveCounts,
     },
     /// The servo answers, but its register does not hold the written value.
     #[error("servo {id} answers, but its register {register} does not hold what was written")]
     NotTaken {
-        /// The id of the servo.
+        /// The id of the servo that answers.
         id: u8,
         /// The first register that was written.
         register: u8,
@@ -33,7 +33,7 @@ pub enum ServoError {
         /// The rate in bits per second.
         baud: u32,
     },
-    /// The port failed.
+    /// The port of the adapter takes no more bytes, or is gone.
     #[error(transparent)]
     Port(#[from] PortError),
 }

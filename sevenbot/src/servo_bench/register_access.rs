@@ -9,7 +9,7 @@ use super::register_table::{SERVO_REGISTERS, ServoMemory, ServoRegister};
 /// The value of a register of one servo.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ServoValue {
-    /// The register.
+    /// The row of [`SERVO_REGISTERS`].
     pub register: ServoRegister,
     /// The value, with its sign.
     pub value: i32,
@@ -24,9 +24,9 @@ pub enum SetError {
     /// The value is out of range. Nothing was sent.
     #[error("{value} is out of range: {} takes {} to {}", register.name, register.range.0, register.range.1)]
     OutOfRange {
-        /// The register.
+        /// The row of [`SERVO_REGISTERS`], with the range.
         register: ServoRegister,
-        /// The value.
+        /// The value that was to be written.
         value: i32,
     },
     /// An id is set by [`set_id`](super::set_id::set_id), which first checks that only one servo answers. Nothing was sent.

@@ -19,7 +19,7 @@ pub enum ServoMemory {
 }
 
 impl ServoMemory {
-    /// A word for a table.
+    /// `EEPROM`, `RAM` or `read only`, for a table.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -40,7 +40,7 @@ pub enum RowSource {
 }
 
 impl RowSource {
-    /// A word for a table.
+    /// `SCSCL library` or `SCS memory table`, for a table.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -50,7 +50,7 @@ impl RowSource {
     }
 }
 
-/// One register of a servo.
+/// A row of the register table: one value of a servo, in one or two bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ServoRegister {
     /// The name in lower case with dashes, such as `min-position`.
@@ -59,7 +59,7 @@ pub struct ServoRegister {
     pub address: u8,
     /// Bytes, 1 or 2; the high byte is first.
     pub width: u8,
-    /// The lowest and highest value.
+    /// The lowest and highest value that may be written; of a read-only register, those of its raw number.
     pub range: (u16, u16),
     /// The unit; empty for a code or a number.
     pub unit: &'static str,

@@ -33,23 +33,23 @@ pub struct ScanPlan {
     pub wait: Option<Duration>,
 }
 
-/// Progress of a scan.
+/// How far a scan has come, for the progress that [`scan`] reports.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ScanProgress {
-    /// The present baud rate.
+    /// The rate of the last question, in bits per second.
     pub baud: u32,
     /// Questions of the first pass so far, over all rates.
     pub asked: usize,
-    /// Servos found so far.
+    /// Ids at which something answered, at the rates that are done.
     pub found: usize,
 }
 
 /// An id at which something answered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FoundServo {
-    /// The baud rate.
+    /// The rate at which it answered, in bits per second.
     pub baud: u32,
-    /// The id.
+    /// The id on the servo bus, 0 to 253.
     pub id: u8,
     /// Whether the answers come from one servo, come from several, or are damaged.
     pub answers: AnswerQuality,
@@ -78,7 +78,7 @@ impl AnswerQuality {
     }
 }
 
-/// The result of a scan.
+/// What a scan found, and what it learned about the adapter.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ScanResult {
     /// In the order of the rates, then of the ids.
@@ -90,7 +90,7 @@ pub struct ScanResult {
 }
 
 impl ScanPlan {
-    /// All ids at one rate.
+    /// A plan for all ids, 0 to 253, at one rate.
     #[must_use]
     pub fn all_ids(baud: u32, wait: Option<Duration>) -> Self {
         Self { rates: vec![baud], ids: 0..=super::MAX_ID, wait }

@@ -28,7 +28,7 @@ pub struct ServoInfo {
     pub byte_order: u8,
     /// The baud rate; `None` for an undefined code.
     pub baud: Option<u32>,
-    /// Does the servo acknowledge writes?
+    /// Does the servo acknowledge writes (register 8)?
     pub acknowledges_writes: bool,
     /// Lowest and highest goal position in counts. If both are 0 the motor turns without end.
     pub position_limits: (u16, u16),
@@ -44,13 +44,13 @@ pub struct ServoInfo {
     pub torque_switch: u8,
     /// The goal position in counts.
     pub goal_position: u16,
-    /// Is the EEPROM unlocked?
+    /// Is the EEPROM unlocked: is register 48 zero?
     pub is_unlocked: bool,
     /// The measurements; `None` if the position is outside 0 to 1023 counts.
     pub reading: Option<Reading>,
     /// The error bits of the status register and of the answer that held it.
     pub errors: u8,
-    /// Does the servo move?
+    /// Does the servo report that it moves (register 66)?
     pub is_moving: bool,
 }
 

@@ -19,7 +19,7 @@ pub enum SetIdError {
     /// No servo answers, several do, or the only one has another id or gives damaged answers. Nothing was written.
     #[error("{}", not_alone(answering))]
     NotAlone {
-        /// The ids that answer.
+        /// All ids that answer at the rates of the plan.
         answering: Vec<FoundServo>,
     },
     /// The EEPROM cannot be unlocked. The id was not written.

@@ -54,7 +54,7 @@ const GROUP: usize = 16;
 /// The time from power-up to the first step: the servos start, and the joints are measured.
 const START: time::Duration = time::Duration::from_millis(1_000);
 
-/// Arms that step together.
+/// Arms that step together, each in a simulation of its own.
 #[derive(Clone, Debug)]
 pub struct SimulatedArms {
     arms: Vec<SteppedArm>,
@@ -76,7 +76,7 @@ impl SimulatedArms {
         arms
     }
 
-    /// The number of arms.
+    /// The number of arms: one for each seed.
     #[must_use]
     pub const fn count(&self) -> usize {
         self.arms.len()

@@ -23,7 +23,7 @@ pub const AGE: Range<usize> = 31..32;
 
 /// A number of an array: `f32` or `f64`.
 pub trait Number: Copy + Send + Sync {
-    /// As `f64`.
+    /// The same number as `f64`, without loss.
     fn widen(self) -> f64;
     /// The nearest number of this type.
     fn nearest(number: f64) -> Self;

@@ -15,7 +15,7 @@ pub enum StepError {
         arm: usize,
         /// The number of the joint, from 1.
         joint: usize,
-        /// The target.
+        /// The target: not a number from 0 to 180.
         degrees: f64,
     },
     /// A measurement of another simulation is not a number, or far too large.
@@ -28,7 +28,7 @@ pub enum StepError {
         arm: usize,
         /// The number of the joint, from 1.
         joint: usize,
-        /// The measurement.
+        /// The measurement in its unit: not a number, or beyond 100 000 either way.
         value: f64,
     },
     /// The time of an exchange is not 1 to 1000 whole milliseconds.

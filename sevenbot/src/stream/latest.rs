@@ -80,7 +80,7 @@ struct Leading {
 }
 
 impl LatestPoints {
-    /// No action so far.
+    /// Without an action: [`Self::next`] returns `None` until the first [`Self::offer`].
     #[must_use]
     pub fn new(options: StreamOptions) -> Self {
         Self { options, leading: None, counts: LatestCounts::default() }

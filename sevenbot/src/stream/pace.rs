@@ -30,7 +30,7 @@ pub struct StreamPace {
 /// How well a stream kept its due times.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PaceCounts {
-    /// Points that were sent.
+    /// Points that were sent, without those that were passed over.
     pub points: u32,
     /// Points later than a quarter of the period, and points that were passed over.
     pub late: u32,

@@ -7,7 +7,7 @@ use crate::process::TaskResult;
 
 /// The target triple of the chip.
 pub const CHIP: &str = "thumbv7em-none-eabihf";
-/// The root of the workspace.
+/// The root of the workspace, as an absolute path.
 #[must_use]
 pub fn root() -> &'static Path {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));

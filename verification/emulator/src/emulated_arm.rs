@@ -22,7 +22,7 @@ const REPLY_TIMEOUT: Duration = Duration::from_millis(5_000);
 /// The time between two checks for a reply.
 const REPLY_PERIOD: Duration = Duration::from_millis(1);
 
-/// The image and its servos.
+/// The image in the emulator and its servos in this process, both in real time.
 pub struct EmulatedArm {
     /// The simulated servos with their load.
     pub plant: Plant,

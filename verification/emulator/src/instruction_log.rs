@@ -10,7 +10,6 @@ use crate::monitor::Monitor;
 use crate::process::TaskResult;
 use crate::trace::{self, TraceEvent};
 
-/// The file of the log.
 pub(crate) struct InstructionLog {
     path: PathBuf,
     begin: u64,
@@ -27,7 +26,6 @@ impl InstructionLog {
         ["-icount", clock, "-singlestep", "-D", &self.path.display().to_string()].map(str::to_owned)
     }
 
-    /// Switches the log on.
     pub(crate) fn begin(&mut self, monitor: &mut Monitor) -> TaskResult {
         self.begin = fs::metadata(&self.path).map_or(0, |log| log.len());
         monitor.human("log exec,nochain")

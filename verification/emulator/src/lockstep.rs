@@ -48,9 +48,9 @@ pub struct Lockstep<B> {
 
 /// Numbers of bytes that the image has sent.
 pub struct Sent {
-    /// On the host link.
+    /// On the host link, USART1.
     pub to_host: usize,
-    /// On the servo bus.
+    /// On the servo bus, USART2.
     pub to_servos: usize,
 }
 

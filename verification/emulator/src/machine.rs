@@ -75,7 +75,6 @@ impl Machine {
         self.monitor.wait_for_bits(HOST_LINK_CONTROL, RECEIVER_ON)
     }
 
-    /// Restarts the chip.
     pub(crate) fn reset(&mut self) -> TaskResult {
         self.monitor.execute("system_reset", "")
     }

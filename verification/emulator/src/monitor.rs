@@ -15,7 +15,7 @@ pub fn accept(listener: &UnixListener) -> TaskResult<UnixStream> {
     Ok(stream)
 }
 
-/// A connection to the monitor.
+/// A connection to the emulator's monitor, which speaks QMP.
 pub struct Monitor {
     stream: BufReader<UnixStream>,
     /// The file into which the emulator writes memory for [`Self::memory`].

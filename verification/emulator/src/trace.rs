@@ -17,14 +17,14 @@ const TIME: u64 = 0x4000_0024;
 /// GPIOA_BSRR (RM0090, section 8.4.7).
 const PORT_A: u64 = 0x4002_0018;
 
-/// An event of the log.
+/// What a line of the log tells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TraceEvent {
     /// An instruction was executed.
     Step {
         /// Its address.
         at: u64,
-        /// True in an exception handler.
+        /// True in an exception handler: bit 0 of the flags in the line.
         in_handler: bool,
     },
     /// The time was read: the count of TIM2, in microseconds.
@@ -37,7 +37,7 @@ pub enum TraceEvent {
     Wrote(u64),
 }
 
-/// Parses a log.
+/// The events of a log, in order, without instructions that were not executed after all.
 pub fn parse(log: &str) -> Vec<TraceEvent> {
     let mut events = Vec::new();
     for line in log.lines() {

@@ -11,7 +11,7 @@ pub struct Cache<const LINE: usize, const LINES: usize> {
 }
 
 impl<const LINE: usize, const LINES: usize> Cache<LINE, LINES> {
-    /// An empty cache.
+    /// An empty cache. `LINE` must be a power of two, and `LINES` at least 1.
     #[must_use]
     pub const fn new() -> Self {
         const { assert!(LINE.is_power_of_two() && LINES > 0) };
@@ -35,7 +35,7 @@ impl<const LINE: usize, const LINES: usize> Cache<LINE, LINES> {
         }
     }
 
-    /// Removes all lines.
+    /// Removes all lines, so that the next reads load them again.
     pub fn flush(&mut self) {
         self.lines.clear();
     }

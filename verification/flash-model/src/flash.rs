@@ -38,7 +38,6 @@ struct Bits {
 /// A flash with sectors of `SECTOR` bytes and words of `WORD` bytes, at most four.
 #[derive(Clone, Debug)]
 pub struct Flash<const SECTOR: usize, const WORD: usize = 4> {
-    /// The present contents.
     cells: Vec<u8>,
     /// For each word, the value that a program operation requested, or its value at the start. All ones after an erase.
     requested: Vec<u8>,
@@ -92,7 +91,7 @@ impl<const SECTOR: usize, const WORD: usize> Flash<SECTOR, WORD> {
         Self { inert: true, ..Self::holding(bytes) }
     }
 
-    /// The present contents.
+    /// The bytes as they read now, from address 0 on.
     #[must_use]
     pub fn bytes(&self) -> &[u8] {
         &self.cells

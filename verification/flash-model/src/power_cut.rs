@@ -11,7 +11,6 @@ pub(crate) struct Torn {
     pub(crate) cleared: u32,
     /// Bits that read 1 now.
     pub(crate) set: u32,
-    /// Bits that are marginal now.
     pub(crate) marginal: u32,
 }
 
@@ -27,7 +26,7 @@ pub enum ProgramTear {
     Bytes(u32),
     /// A random part of the bits is programmed.
     RandomBits,
-    /// Only one bit is programmed.
+    /// Only one random bit is programmed.
     OneBit,
     /// All bits but one are programmed.
     AllButOne,
@@ -120,7 +119,7 @@ pub enum EraseTear {
 }
 
 impl EraseTear {
-    /// All tears of an erase.
+    /// All tears, in the order of their declaration.
     pub const ALL: [Self; 12] = [
         Self::Nothing,
         Self::All,

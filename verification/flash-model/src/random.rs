@@ -8,25 +8,25 @@ use rand_xoshiro::rand_core::{Rng, SeedableRng};
 pub struct Random(SplitMix64);
 
 impl Random {
-    /// The sequence of `seed`.
+    /// Begins the sequence of `seed`, which may be any number.
     #[must_use]
     pub fn new(seed: u64) -> Self {
         Self(SplitMix64::seed_from_u64(seed))
     }
 
-    /// The next 64 bits.
+    /// The next 64 bits. All other methods take theirs from it.
     #[expect(clippy::should_implement_trait, reason = "the sequence has no end")]
     pub fn next(&mut self) -> u64 {
         self.0.next_u64()
     }
 
-    /// The next 32 bits.
+    /// The low half of the next 64 bits.
     pub fn word(&mut self) -> u32 {
         let [a, b, c, d, ..] = self.next().to_le_bytes();
         u32::from_le_bytes([a, b, c, d])
     }
 
-    /// The next byte.
+    /// The high byte of the next 64 bits.
     pub fn byte(&mut self) -> u8 {
         let [byte, ..] = self.next().to_be_bytes();
         byte

@@ -8,7 +8,7 @@ pub struct FlashSupply {
 }
 
 impl FlashSupply {
-    /// A constant supply.
+    /// A supply of `millivolts` at all times, unless [`Self::then`] adds points.
     #[must_use]
     pub fn steady(millivolts: u32) -> Self {
         Self { points: vec![(0, millivolts)] }

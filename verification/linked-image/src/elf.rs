@@ -16,7 +16,7 @@ use crate::thumb_decode::{self, Effect, halfword};
 
 type SourceLines<'data> = addr2line::Context<EndianSlice<'data, LittleEndian>>;
 
-/// A linked program.
+/// A linked program for the chip: its symbols, its instructions and their lines of source.
 pub struct Program<'data> {
     /// Functions and data with a name. The size of some is 0: see [`Self::functions`].
     pub symbols: Vec<Symbol>,
@@ -34,11 +34,11 @@ pub struct Program<'data> {
 pub struct Symbol {
     /// Its demangled name, without the hash.
     pub name: String,
-    /// Its address.
+    /// The address of its first byte, without the bit that marks Thumb code.
     pub address: u64,
     /// Its length in bytes.
     pub size: u64,
-    /// True for a function.
+    /// True for a function, false for data.
     pub is_function: bool,
 }
 
@@ -46,19 +46,18 @@ pub struct Symbol {
 pub struct Section {
     /// Its name, such as `.text`.
     pub name: String,
-    /// Its address.
+    /// The address of its first byte while the program runs.
     pub address: u64,
     /// Its length in bytes.
     pub size: u64,
 }
 
-/// A line of source.
+/// The place in the source that an instruction comes from. It prints as `file:line`.
 pub struct SourceLine {
     /// The file: its path in the workspace, or in its package.
     pub file: String,
     /// True for a file of this workspace.
     pub is_ours: bool,
-    /// The number of the line.
     line: u32,
 }
 
@@ -70,7 +69,7 @@ struct CodeSection<'data> {
 }
 
 impl<'data> Program<'data> {
-    /// Reads a linked ELF file.
+    /// Reads a 32-bit ELF file. Fails if the file has no vector table.
     pub fn read(file: &'data [u8]) -> ReadResult<Self> {
         let elf: ElfFile32<'_> = ElfFile32::parse(file)?;
         let code = code(&elf)?;
@@ -136,7 +135,7 @@ impl<'data> Program<'data> {
         &self.handlers
     }
 
-    /// The function that contains `address`.
+    /// The function that contains `address`; `None` for data, and for code without a symbol.
     pub fn function_at(&self, address: u64) -> Option<&Symbol> {
         self.symbols.iter().find(|symbol| symbol.is_function && symbol.holds(address))
     }

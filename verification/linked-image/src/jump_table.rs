@@ -13,7 +13,6 @@ use yaxpeax_arm::armv7::{ConditionCode, Instruction, Opcode, Operand, RegShiftSt
 
 use crate::thumb_decode::{self, decode};
 
-/// The code of a function.
 pub(crate) struct FunctionCode<'a> {
     /// The address of its first byte.
     pub(crate) start: u64,

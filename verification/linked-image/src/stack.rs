@@ -23,7 +23,7 @@ const GUARDS: (&[&str], &str) = (&["_defmt_acquire", "_defmt_release"], "core::p
 /// The largest stack of a function with its callees.
 #[derive(Clone, Default)]
 pub struct Depth {
-    /// Its size in bytes.
+    /// Its size in bytes: the sum of those in `path`.
     pub bytes: u64,
     /// The functions of the deepest path, outermost first, with the bytes of each.
     pub path: Vec<(String, u64)>,

@@ -6,14 +6,14 @@
 use yaxpeax_arch::{Decoder, U8Reader};
 use yaxpeax_arm::armv7::{ConditionCode, InstDecoder, Instruction, Opcode, Operand, Reg};
 
-/// The effect of one instruction.
+/// The effect of one instruction on the flow of control, the stack or the interrupts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Effect {
     /// Calls the function at this address.
     Call(u64),
     /// Jumps to this address, always or on a condition.
     Jump(u64),
-    /// Returns to the caller.
+    /// Returns to the caller: BX LR, or a POP of PC.
     Return,
     /// Jumps or calls to an address that the instruction does not contain.
     Indirect,
@@ -27,7 +27,7 @@ pub enum Effect {
     DisableInterrupts,
     /// Clears PRIMASK, or writes a register to it.
     EnableInterrupts,
-    /// None of these.
+    /// Another instruction, with none of these effects.
     None,
     /// Not an instruction of this core, or not known to the decoder.
     Unknown,

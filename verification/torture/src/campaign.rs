@@ -21,7 +21,7 @@ const WORLD_TIME: Duration = Duration::from_millis(3_600_000);
 /// Progress is reported whenever no world has ended for this long.
 const PROGRESS_PERIOD: RealTime = RealTime::from_millis(500);
 
-/// The time of a campaign.
+/// How long the worlds run: in virtual or in real time.
 #[derive(Clone, Copy, Debug)]
 pub enum TimeBudget {
     /// The sum of the virtual times of all worlds.
@@ -30,7 +30,7 @@ pub enum TimeBudget {
     Real(RealTime),
 }
 
-/// What a campaign runs.
+/// The worlds and trials to run, as the command line selects them.
 #[derive(Clone, Copy, Debug)]
 pub struct CampaignPlan {
     /// The seed of the first world. The next world has the next seed.
@@ -45,7 +45,7 @@ pub struct CampaignPlan {
     pub motions: u64,
 }
 
-/// The result of a campaign.
+/// What a campaign has counted, and the world that failed.
 #[derive(Debug, Default)]
 pub struct CampaignResult {
     /// The number of completed worlds and the sum of their counts, by name of the scenario.

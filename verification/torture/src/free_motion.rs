@@ -17,10 +17,10 @@ use crate::shared::free_moves::{FreeMoves, Step};
 /// The time from power-up to the first move.
 const START: Duration = Duration::from_millis(1_000);
 
-/// The result of some motions.
+/// What some motions showed. Each is carried out with and without protection.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct FreeMotionTrial {
-    /// The number of motions.
+    /// The number of motions that were compared.
     pub motions: usize,
     /// The number of bytes to the servos that were compared.
     pub bytes: usize,

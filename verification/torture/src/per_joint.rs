@@ -4,7 +4,7 @@ use std::ops::{Index, IndexMut};
 
 use protocol_core::registers::{JOINTS, Joint};
 
-/// One value per joint.
+/// One value per joint, indexed by [`Joint`]. Joint 1 comes first.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PerJoint<T>(pub [T; JOINTS]);
 

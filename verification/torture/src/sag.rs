@@ -191,7 +191,7 @@ impl PosedArm {
     }
 }
 
-/// The sag for each failure.
+/// The sag for each failure, in the order of [`SagCause::ALL`]. It prints itself as a table in Markdown.
 #[derive(Clone, Debug)]
 pub struct SagTable(pub Vec<(SagCause, Sag)>);
 

@@ -8,12 +8,12 @@ use InjectedFault::{
     Wall, Watchdog,
 };
 
-/// A fault to inject.
+/// A fault that a world injects. [`Scenario::faults`] lists those of a scenario.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum InjectedFault {
     /// A servo becomes missing, late, garbled or stuck, or recovers.
     ServoFault,
-    /// A servo restarts.
+    /// A servo restarts, as after a dip of its supply. Its torque is off after that.
     ServoRestart,
     /// The rates of corrupted and delayed frames on the servo bus change.
     BusDisturbance,
@@ -25,7 +25,7 @@ pub enum InjectedFault {
     HostStopsReading,
     /// The shell stalls for up to 5 s.
     ShellStall,
-    /// The power is cut.
+    /// The power of the controller and of the servos is cut.
     PowerCut,
     /// The power is cut during the next save.
     PowerCutInSave,
@@ -37,7 +37,7 @@ pub enum InjectedFault {
     Panic,
     /// A bit becomes unprogrammable in one of four cases, or a sector unerasable in one of forty.
     FlashWear,
-    /// A hand turns a joint.
+    /// A hand turns a joint for up to 5 s. It releases the joint when motors may drive it.
     Hand,
     /// A wall is put in the way of a joint, stiff or soft, for up to a minute.
     Wall,
@@ -53,7 +53,7 @@ pub enum InjectedFault {
     EmergencyStop,
 }
 
-/// A kind of world.
+/// A kind of world: which faults occur in it, and how often.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Scenario {
     /// Its name on the command line.
@@ -189,7 +189,7 @@ pub static SCENARIOS: [Scenario; 10] = [
     },
 ];
 
-/// The scenario with this name.
+/// The scenario with this name on the command line; `None` if there is none.
 #[must_use]
 pub fn find(name: &str) -> Option<&'static Scenario> {
     SCENARIOS.iter().find(|scenario| scenario.name == name)

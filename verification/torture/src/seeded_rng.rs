@@ -72,7 +72,7 @@ impl SeededRng {
         choices.get(index).copied().unwrap_or(otherwise)
     }
 
-    /// A random joint.
+    /// A joint. All are equally likely.
     pub fn joint(&mut self) -> Joint {
         let index = self.below(JOINTS);
         Joint::ALL.get(index).copied().unwrap_or(Joint::ALL[0])

@@ -11,7 +11,7 @@ pub enum Column {
     Right(&'static str),
 }
 
-/// A table with its rows.
+/// A table that grows by rows, and prints itself as text.
 #[derive(Clone, Debug)]
 pub struct TextTable {
     columns: Vec<Column>,
@@ -19,7 +19,7 @@ pub struct TextTable {
 }
 
 impl TextTable {
-    /// A table without rows.
+    /// A table with these columns, from left to right, and no rows yet.
     #[must_use]
     pub fn new(columns: impl IntoIterator<Item = Column>) -> Self {
         Self { columns: columns.into_iter().collect(), rows: Vec::new() }

@@ -12,7 +12,7 @@ impl Display for Violation {
     }
 }
 
-/// The result of a check.
+/// The result of a check: an error is the rule that does not hold.
 pub type Check<T = ()> = Result<T, Violation>;
 
 /// Returns a violation with the description `what`, unless the rule `holds`.

@@ -41,7 +41,7 @@ counts! {
     obstacles,
     /// Alarms that were forced on servos.
     servo_trips,
-    /// Emergency stops.
+    /// Cuts of the supply of the servos alone.
     emergency_stops,
     /// Emergency stops after which the arm had to enter state 0.
     checked_stops,
@@ -53,7 +53,7 @@ counts! {
     cut_starts,
     /// Power cuts during a save.
     cut_saves,
-    /// Saved settings.
+    /// Saves of settings, with those that a power cut interrupted.
     saves,
     /// Times that a joint was given torque.
     engagements,

@@ -11,7 +11,7 @@ pub type BlockId = Rc<str>;
 pub struct ProgramError {
     /// `None` if the fault concerns the workspace as a whole.
     pub block: Option<BlockId>,
-    /// What is wrong.
+    /// What is wrong. It prints as a sentence in English.
     pub fault: ProgramFault,
 }
 
@@ -74,11 +74,11 @@ pub enum ProgramFault {
     OutOfRange {
         /// The quantity, which determines the unit.
         quantity: Quantity,
-        /// The number.
+        /// The number that the program uses, in the unit of `quantity`.
         value: f64,
-        /// The lowest allowed value.
+        /// The lowest allowed value, in the same unit.
         lowest: f64,
-        /// The highest allowed value.
+        /// The highest allowed value, in the same unit.
         highest: f64,
     },
 }

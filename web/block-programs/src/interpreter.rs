@@ -21,7 +21,7 @@ pub enum Event {
     Command(Command),
     /// The program reads this sensor. Call [`Interpreter::answer`] before the next [`Interpreter::advance`].
     Sensor(Sensor),
-    /// The program is over.
+    /// The program is over. Every further call returns this again.
     Over,
 }
 

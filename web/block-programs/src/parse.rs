@@ -82,7 +82,6 @@ fn program(text: &str) -> Result<Program, ProgramError> {
 /// A function that blocks may call.
 struct KnownFunction {
     number: usize,
-    /// The number of its parameters.
     parameters: usize,
 }
 

@@ -8,7 +8,7 @@ use crate::program::{Arithmetic, Comparison};
 pub enum Value {
     /// A finite number: a calculation with any other result is an error.
     Number(f64),
-    /// True or false.
+    /// A truth value. As a number, true is 1 and false is 0.
     Truth(bool),
 }
 

@@ -9,7 +9,7 @@ use tempfile::TempDir;
 use crate::page::Page;
 use crate::viewed::simulator;
 
-/// A running class.
+/// A class on this computer. Dropping it ends its programs.
 #[derive(Debug)]
 pub struct ClassRun {
     _server: RunningProgram,

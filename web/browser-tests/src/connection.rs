@@ -13,7 +13,7 @@ use system_tests::process;
 use system_tests::wait::TIMEOUT;
 use tungstenite::{Message, WebSocket};
 
-/// An open connection.
+/// A connection to a browser or to one of its pages.
 #[derive(Debug)]
 pub struct Connection {
     socket: WebSocket<TcpStream>,

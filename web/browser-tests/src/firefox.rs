@@ -108,7 +108,7 @@ impl Firefox {
         errors.filter_map(|event| event["params"]["text"].as_str())
     }
 
-    /// The addresses of all requests.
+    /// The addresses of all requests since the page was opened, in order.
     pub fn requests(&self) -> impl Iterator<Item = &str> {
         self.session.events.iter().filter_map(|event| event["params"]["request"]["url"].as_str())
     }

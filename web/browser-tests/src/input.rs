@@ -101,7 +101,7 @@ impl Page {
         }
     }
 
-    /// Presses a key once.
+    /// Presses one of the keys of [`Self::keys`] once.
     pub fn key(&mut self, key: &str) {
         self.keys(key, 1);
     }

@@ -26,7 +26,7 @@ const KEEP_TEXTS: &str = "
       }).observe(document, { subtree: true, childList: true, characterData: true });
     })();";
 
-/// An open page.
+/// A page in a window of Chromium.
 #[derive(Debug)]
 pub struct Page {
     connection: Connection,
@@ -52,7 +52,7 @@ pub struct Screen {
 pub const DESKTOP: Screen = Screen { width: 1_280, height: 720, is_dark: false, is_phone: false };
 /// A desktop computer with dark colours.
 pub const DARK: Screen = Screen { is_dark: true, ..DESKTOP };
-/// A phone.
+/// A phone in portrait format, with light colours.
 pub const PHONE: Screen = Screen { width: 390, height: 844, is_dark: false, is_phone: true };
 
 impl Page {
@@ -89,7 +89,7 @@ impl Page {
         page
     }
 
-    /// Loads the page again.
+    /// Loads the page again, and waits until it has drawn a picture.
     #[track_caller]
     pub fn reload(&mut self) {
         self.evaluate("delete window.sevenbot");
@@ -159,7 +159,7 @@ impl Page {
         value.as_f64().unwrap_or_else(|| panic!("{expression} is {value}"))
     }
 
-    /// The text of an element.
+    /// The text of the first element that matches `selector`, and of the elements in it.
     #[track_caller]
     pub fn text(&mut self, selector: &str) -> String {
         let text = self.evaluate(&format!("document.querySelector(`{selector}`).textContent"));
@@ -307,7 +307,7 @@ impl Page {
         })
     }
 
-    /// The addresses of all requests.
+    /// The addresses of all requests since the page was opened, in order. They include those of WebSockets.
     pub fn requests(&mut self) -> Vec<String> {
         self.settle();
         let url = |event: &Value| match event["method"].as_str()? {

@@ -4,7 +4,7 @@ use std::fs;
 use std::io::{BufWriter, Cursor};
 use std::path::Path;
 
-/// Pixels of a picture.
+/// A picture without transparency.
 #[derive(Clone, Debug)]
 pub struct Picture {
     /// Its width in pixels.
@@ -16,7 +16,7 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// Decodes a PNG file.
+    /// Decodes a PNG file in RGB or RGBA with 8 bits each, and drops its transparency.
     #[must_use]
     pub fn decode(png: &[u8]) -> Self {
         let mut reader = png::Decoder::new(Cursor::new(png)).read_info().expect("a picture");
@@ -28,7 +28,7 @@ impl Picture {
         Self { width: info.width as usize, height: info.height as usize, pixels }
     }
 
-    /// The colour at a place.
+    /// The colour of a pixel. `x` and `y` count from 0 at the top left.
     #[must_use]
     pub fn at(&self, x: usize, y: usize) -> [u8; 3] {
         self.pixels[y * self.width + x]

@@ -39,7 +39,7 @@ impl Viewed {
         Self::start(true, &["--read-only"])
     }
 
-    /// Ends the server.
+    /// Kills the server, so that the page loses its line to the arm.
     pub fn end_server(&mut self) {
         self.server = None;
     }

@@ -29,7 +29,7 @@ pub struct SeenThing {
     pub name: String,
     /// Its middle: x, y, z in mm.
     pub at: [f64; 3],
-    /// Does the arm carry it?
+    /// While the arm carries it, it reaches no goal.
     pub is_carried: bool,
 }
 

@@ -30,7 +30,7 @@ struct GoalInFile {
     within: Option<f64>,
 }
 
-/// One goal of an exercise.
+/// One goal of an exercise. Its members in the file determine its kind.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(try_from = "GoalInFile")]
 pub enum Goal {

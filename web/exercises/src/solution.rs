@@ -3,7 +3,6 @@
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-/// One step of a solution.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub(crate) enum Step {
@@ -21,7 +20,6 @@ pub(crate) enum Step {
     Repair,
 }
 
-/// The position of the claws.
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Claws {
@@ -29,7 +27,7 @@ pub(crate) enum Claws {
     Close,
 }
 
-/// A part of a solution.
+/// A part of a solution. The parts solve the exercise one after the other.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum SolutionPart {
     /// A program of blocks: the JSON of a Blockly workspace.

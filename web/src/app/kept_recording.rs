@@ -12,7 +12,6 @@ const KEPT: &str = "recording";
 /// The recording of the page: recorded, or opened from a file.
 pub(super) struct KeptRecording {
     pub(super) text: String,
-    /// The number of moments.
     pub(super) moments: usize,
     /// The time of the last moment.
     pub(super) length: Duration,

@@ -3,9 +3,9 @@
 /// The range of values of an axis, and the step of its ticks.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Axis {
-    /// The lowest value.
+    /// The value at the lower end, a multiple of `step`.
     pub low: f32,
-    /// The highest value.
+    /// The value at the upper end, a multiple of `step`.
     pub high: f32,
     /// The difference between two ticks.
     pub step: f32,

@@ -17,7 +17,7 @@ const TEXT: f64 = 16.0;
 const ENTRY: f64 = 34.0;
 const FONT: &str = "12px system-ui, sans-serif";
 
-/// The settings of a plot.
+/// What [`draw`] shows of a [`History`], in which size and colours.
 #[derive(Clone, Copy, Debug)]
 pub struct Plot<'a> {
     /// The quantity on the vertical axis.

@@ -53,7 +53,6 @@ pub(super) enum Next {
 }
 
 impl Action {
-    /// May this action move joints?
     pub(super) const fn may_move(&self) -> bool {
         matches!(self, Self::Writing(_, Next::Arrival(_)) | Self::Moving(_) | Self::Line(_))
     }

@@ -37,7 +37,7 @@ impl Part {
 /// The first point at which a ray hits the arm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
-    /// The body.
+    /// The body that the ray hits.
     pub body: Body,
     /// The point in the coordinates of the body, in mm.
     pub local: Vec3,
@@ -58,7 +58,7 @@ impl Default for Arm {
 }
 
 impl Arm {
-    /// The bodies and their meshes.
+    /// Each body with its mesh, in the order of [`Body::ALL`].
     #[must_use]
     pub const fn meshes(&self) -> &[(Body, Mesh); BODIES] {
         &self.meshes

@@ -124,7 +124,7 @@ pub enum Refusal {
 /// The failure for a position that is out of reach or not allowed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Unreachable {
-    /// The reason.
+    /// Out of reach, or refused by the guard.
     pub why: Refusal,
     /// For a position out of reach, the angles of the nearest pose with the same direction of the tool. `None` if there is none,
     /// or if the guard does not allow the pose.

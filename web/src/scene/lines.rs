@@ -35,7 +35,6 @@ pub struct Lines {
 }
 
 impl Lines {
-    /// The lines of a view.
     #[must_use]
     pub fn of(view: &View, camera: &Camera) -> Self {
         let palette = view.theme.palette();

@@ -22,14 +22,14 @@ const ZOOM_PER_PIXEL: f32 = 0.0012;
 pub enum SceneEvent {
     /// The pointer is over another part now; `None` if it is over no part.
     Hovered(Option<Part>),
-    /// A joint is dragged.
+    /// The pointer has dragged a joint to a new angle.
     JointDragged {
         /// Its number, 1 to 7.
         joint: u8,
         /// The new angle in degrees, within the limits.
         degrees: f32,
     },
-    /// The tip is dragged.
+    /// The pointer has dragged the tip to a new wanted position.
     TipDragged(TipWish),
     /// A drag of a joint or the tip has ended.
     Released,

@@ -20,7 +20,7 @@ impl Rgb {
     }
 }
 
-/// The theme: light or dark.
+/// Whether the page is light or dark. It selects a [`Palette`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Theme {
     /// A light background.
@@ -35,9 +35,9 @@ pub enum Theme {
 pub struct Palette {
     /// The background of the scene.
     pub background: Rgb,
-    /// The table under the arm.
+    /// The table under the arm, and the background of plots.
     pub table: Rgb,
-    /// Lines of the grid.
+    /// Lines of the grid in the scene and in plots, and walls without a colour in their name.
     pub grid: Rgb,
     /// Axes and text.
     pub text: Rgb,
@@ -55,11 +55,11 @@ pub struct Palette {
     pub unreachable: Rgb,
     /// Mixed into the colour of the part under the pointer.
     pub hover: Rgb,
-    /// A joint that works.
+    /// A driven joint without a problem.
     pub joint_ok: Rgb,
     /// A joint whose motor is off.
     pub joint_limp: Rgb,
-    /// A joint with a fault.
+    /// A stalled joint; every joint if the arm does not tell which servo has a fault.
     pub joint_fault: Rgb,
     /// A joint whose servo does not answer.
     pub joint_missing: Rgb,
@@ -122,7 +122,7 @@ const DARK: Palette = Palette {
 };
 
 impl Theme {
-    /// The colours of the theme.
+    /// The colours of the scene and of plots in this theme.
     #[must_use]
     pub const fn palette(self) -> &'static Palette {
         match self {

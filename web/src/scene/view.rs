@@ -33,7 +33,7 @@ pub struct View {
     pub unreachable: Option<Vec3>,
     /// The walls, the things on the table, and the thing that the arm carries.
     pub things: Vec<Thing>,
-    /// The part under the pointer.
+    /// The part under the pointer; `None` if the pointer is over no part.
     pub hovered: Option<Part>,
     /// The theme of the page: light or dark.
     pub theme: Theme,

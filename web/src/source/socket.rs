@@ -9,7 +9,7 @@ use web_sys::{BinaryType, CloseEvent, MessageEvent, WebSocket};
 
 use super::{LineState, Source};
 
-/// A WebSocket to a server.
+/// A line over a WebSocket to the server that the page came from.
 pub struct SocketSource {
     socket: WebSocket,
     shared: Rc<RefCell<Shared>>,

@@ -59,7 +59,6 @@ const POSE: [u8; JOINTS] = [90, 90, 65, 90, 90, 90, 80];
 /// 90 degrees in hundredths, low byte first.
 const FINE_POSE: [[u8; 2]; JOINTS] = [[0x28, 0x23]; JOINTS];
 
-/// Addresses in the image.
 struct ImageAddresses {
     sleeps: Vec<u64>,
     host_interrupt: u64,
@@ -73,7 +72,6 @@ struct ImageAddresses {
 
 /// Instructions of the idle arm.
 struct Silence {
-    /// In ten milliseconds.
     ten_millis: u64,
     /// The longest stretch with interrupts masked, log lines included.
     masked: u64,

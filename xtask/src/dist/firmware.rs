@@ -24,7 +24,6 @@ const ERASED: u8 = 0xFF;
 /// Bytes in a line of a `.hex` file.
 const HEX_LINE: usize = 16;
 
-/// The names of the files.
 pub(super) fn names(release: &Release) -> Vec<String> {
     let tails = [".elf", ".bin", ".hex", ".dfu", ".map", ".sizes.txt"];
     let image = tails.map(|tail| release.name("firmware-stm32", tail));

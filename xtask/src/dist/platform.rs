@@ -84,7 +84,6 @@ pub(super) fn add_target(triple: &str) -> TaskResult {
     run_command(Command::new("rustup").args(["--quiet", "target", "add", triple]).current_dir(root()))
 }
 
-/// The system of this computer.
 pub(super) fn host_platform() -> TaskResult<Platform> {
     match ARCH {
         "x86_64" => Ok(LINUX_X86_64),

@@ -8,7 +8,6 @@ use crate::run::{TaskResult, root};
 /// The number of hexadecimal digits of a commit in versions, as an option of git.
 const COMMIT_DIGITS: &str = "--abbrev=12";
 
-/// A release.
 #[derive(Clone, Debug)]
 pub(super) struct Release {
     /// The version of the workspace: `3.0.0`.

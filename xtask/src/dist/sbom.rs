@@ -21,7 +21,6 @@ fn name(release: &Release, stem: &str) -> String {
     release.name(stem, ".cdx.json")
 }
 
-/// The names of the lists.
 pub(super) fn names(release: &Release) -> Vec<String> {
     LISTED.iter().map(|(_, _, stem)| name(release, stem)).collect()
 }

@@ -9,7 +9,6 @@ use sha2::{Digest, Sha256};
 
 use crate::run::TaskResult;
 
-/// The name of the file.
 pub(super) const NAME: &str = "SHA256SUMS";
 
 /// Writes the file with the sums of all other files in the folder.

@@ -23,14 +23,12 @@ pub(super) fn source(release: &Release) -> String {
     release.name("sevenbot", ".tar.gz")
 }
 
-/// The names of all files.
 pub(super) fn names(release: &Release) -> Vec<String> {
     let pure = PURE.map(|(_, name)| release.name(name, "-py3-none-any.whl"));
     let wheels = PLATFORMS.iter().map(|&platform| wheel(release, platform));
     wheels.chain(pure).chain([source(release)]).collect()
 }
 
-/// Writes all files.
 pub(super) fn write(release: &Release) -> TaskResult {
     for platform in PLATFORMS {
         write_wheel(release, platform)?;

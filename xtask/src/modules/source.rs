@@ -34,7 +34,6 @@ const ITEMS: [&str; 10] =
     ["const", "enum", "fn", "macro_rules", "mod", "static", "struct", "trait", "type", "union"];
 
 impl SourceFile {
-    /// Reads a file.
     pub(crate) fn parse(text: &str) -> TaskResult<Self> {
         let mut source = Self::default();
         source.read(TokenStream::from_str(text).map_err(|why| why.to_string())?);

@@ -42,7 +42,6 @@ impl Tree {
         Ok(())
     }
 
-    /// The number of files.
     pub(crate) fn files(&self) -> usize {
         self.0.len()
     }

@@ -77,7 +77,7 @@ impl Decoder {
         }
     }
 
-    /// Empties the buffer.
+    /// Forgets all bytes taken so far, and a damaged one.
     pub fn clear(&mut self) {
         *self = Self::new();
     }

@@ -56,7 +56,6 @@ fn signed(field: u16, sign: u16) -> i16 {
     if field & sign == 0 { magnitude } else { -magnitude }
 }
 
-/// Encodes sign and magnitude.
 fn sign_and_magnitude(number: i16, sign: u16) -> u16 {
     let magnitude = number.unsigned_abs().min(sign - 1);
     if number < 0 { magnitude | sign } else { magnitude }

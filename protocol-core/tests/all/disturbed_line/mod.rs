@@ -17,7 +17,6 @@ const BURST: usize = 4;
 /// Shorter than the 100 ms that a sender may pause inside a frame.
 const PAUSE_US: u64 = 5_000;
 
-/// What happens to the line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Disturbance {
     Noise,
@@ -86,7 +85,6 @@ fn any_frame(random: &mut Random, victim: bool) -> Vec<u8> {
     frame([3, 4, 6][random.index(3)], address, &data)
 }
 
-/// The result of a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Tally {
     pub frames: usize,

@@ -13,13 +13,12 @@ use crate::style::{BAD, BOLD, GOOD, WARNING};
 /// The largest good offset, from the maker's table.
 const GOOD_UP_TO: i16 = 10;
 
-/// The grade of an offset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Grade {
     /// The joint is well assembled.
     Good,
-    /// The joint can be used.
+    /// Beyond [`GOOD_UP_TO`], but the register can hold the offset.
     Acceptable,
     /// The register cannot hold the offset. The joint has to be assembled again.
     Bad,
@@ -91,7 +90,6 @@ impl Offsets {
     }
 }
 
-/// The offsets for printing.
 #[derive(Debug, Serialize)]
 pub(super) struct OffsetTable {
     joints: Vec<OffsetRow>,

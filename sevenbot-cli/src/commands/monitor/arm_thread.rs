@@ -22,11 +22,9 @@ const RECONNECT_PERIOD: Duration = Duration::from_millis(500);
 /// The arm is lost after this many consecutive unanswered samples.
 const MAX_UNANSWERED: u32 = 3;
 
-/// State of the thread.
 pub(crate) struct ArmThread {
     /// The port from the command line; `None`: any that leads to an arm.
     pub(crate) port: Option<String>,
-    /// The port used last.
     pub(crate) last_port: String,
     /// Baud rate, timeout, attempts and register map. The thread makes one attempt only.
     pub(crate) options: ArmOptions,

@@ -31,7 +31,6 @@ pub(crate) const HELP: [(&str, &str); 13] = [
     ("?", "this help; any key closes it"),
 ];
 
-/// The effect of a key.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum KeyAction {
     Redraw,

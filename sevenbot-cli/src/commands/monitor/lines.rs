@@ -121,7 +121,6 @@ pub(crate) struct SampleJson {
     hottest_celsius: Option<u8>,
     round_trip_ms: f64,
     alarms: Option<u8>,
-    /// The problems with their remedies.
     problems: Vec<ProblemText>,
     #[serde(skip_serializing_if = "Option::is_none")]
     fine: Option<FineJson>,
@@ -169,7 +168,6 @@ impl From<&ArmSample> for SampleJson {
     }
 }
 
-/// Rounds to three decimals.
 fn thousandths(value: f64) -> f64 {
     (value * 1e3).round() / 1e3
 }

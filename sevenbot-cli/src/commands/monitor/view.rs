@@ -16,7 +16,6 @@ use sevenbot::{Joint, StatusBlock};
 use super::plot_kind::{PastSample, PlotKind};
 use super::sample::ArmSample;
 
-/// Time span of the plot.
 pub(crate) const PLOT_SPAN: Duration = Duration::from_secs(20);
 /// A note disappears after this time.
 const NOTE_DURATION: Duration = Duration::from_secs(6);
@@ -86,7 +85,6 @@ impl SpeedChange {
     }
 }
 
-/// State of the connection.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum LinkState {
     /// Not connected, for this reason.
@@ -95,7 +93,6 @@ pub(crate) enum LinkState {
     Open { firmware: String },
 }
 
-/// A dialog above the view.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Dialog {
     Help,

@@ -101,7 +101,6 @@ enum DumpFormat {
     Toml,
 }
 
-/// A register by its name.
 fn register(name: &str) -> Result<&'static ServoRegister, String> {
     ServoRegister::find(name).ok_or_else(|| {
         let names: Vec<_> = SERVO_REGISTERS.iter().map(|row| row.name).collect();

@@ -102,7 +102,6 @@ impl TorqueOffCode {
     }
 }
 
-/// The user's input.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum TorqueCodeInput {
     Switch,

@@ -241,7 +241,6 @@ enum Power {
     Cycle,
 }
 
-/// An answer of the simulator.
 struct SimulatorAnswer<'a> {
     command: &'a SimCommand,
     value: Value,
@@ -284,7 +283,6 @@ pub(crate) fn run(session: &mut Session, args: &SimArgs) -> Result<(), CommandEr
     session.printer.print(&SimulatorAnswer { command: &args.command, value })
 }
 
-/// The request of a command.
 fn request(command: &SimCommand) -> Result<Value, CommandError> {
     Ok(match command {
         SimCommand::Fault(args) => return fault_request(args),

@@ -15,7 +15,6 @@ use crate::command_error::CommandError;
 /// Time limit for a simulator's answer.
 const TIMEOUT: Duration = Duration::from_secs(20);
 
-/// A connection to a simulator.
 pub(super) struct SimulatorConnection {
     path: PathBuf,
     stream: BufReader<UnixStream>,

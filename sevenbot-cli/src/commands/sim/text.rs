@@ -86,7 +86,6 @@ pub(super) fn objects(out: &mut dyn Write, value: &Value) -> io::Result<()> {
     Ok(())
 }
 
-/// The state of the arm.
 pub(super) fn state(out: &mut dyn Write, value: &Value) -> io::Result<()> {
     writeln!(out, "port        {}", string(value, "port"))?;
     time(out, value)?;

@@ -17,7 +17,7 @@ pub(super) fn millis(text: &str) -> Result<u64, &'static str> {
     if (1.0..=1e12).contains(&millis) { Ok(millis.round() as u64) } else { Err(WANTED) }
 }
 
-/// Parses a weight in grams.
+/// Parses a weight in grams, as 150g or 150.
 pub(super) fn grams(text: &str) -> Result<u16, &'static str> {
     text.strip_suffix('g').unwrap_or(text).parse().map_err(|_| "use grams from 0 to 1000, as 150g")
 }

@@ -20,14 +20,12 @@ const LONGEST: Duration = Duration::from_secs(24 * 60 * 60);
 /// Fields of a line: the time and seven angles.
 const FIELDS: usize = 8;
 
-/// A set-point and its time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct TimedPoint {
     pub(super) time: Duration,
     pub(super) joints: FineTargets,
 }
 
-/// A line as JSON.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct JsonLine {

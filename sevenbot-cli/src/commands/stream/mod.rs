@@ -201,7 +201,6 @@ impl PointSource {
     }
 }
 
-/// A stream with its input.
 struct Streamer<'a, 'b> {
     stream: SetPointStream<'a>,
     pace: StreamPace,

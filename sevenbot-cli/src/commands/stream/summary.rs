@@ -9,7 +9,6 @@ use sevenbot::stream::PaceCounts;
 use super::tracking::TrackingError;
 use crate::printer::Printable;
 
-/// The statistics of a stream.
 #[derive(Debug, Serialize)]
 pub(super) struct StreamSummary {
     points: u32,
@@ -18,7 +17,7 @@ pub(super) struct StreamSummary {
     late_points: u32,
     largest_gap_ms: f64,
     jitter_ms: f64,
-    /// Points that the arm refused.
+    /// Frames that the arm refused meanwhile, by its counter in registers 250 and 251.
     refused: u16,
     #[serde(skip_serializing_if = "Option::is_none")]
     tracking: Option<TrackingJson>,

@@ -39,11 +39,9 @@ pub(crate) type Frame = (u8, Vec<u8>);
 pub(crate) enum Restoring {
     /// The set-point period.
     Period,
-    /// The speeds.
     Speeds,
 }
 
-/// A hold in progress.
 #[derive(Debug)]
 pub(crate) struct ArmHold {
     /// The arm has positions in hundredths of a degree, and tells which joints move.

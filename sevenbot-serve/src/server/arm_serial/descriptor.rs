@@ -7,7 +7,6 @@ use tty_ports::serial::Serial;
 
 use crate::server::readiness::Readiness;
 
-/// An open port.
 #[derive(Debug)]
 pub(crate) struct ArmSerial {
     port: Serial,

@@ -134,7 +134,7 @@ impl Escape {
 pub struct Breach {
     /// The part of the arm that is inside the obstacle.
     pub part: Part,
-    /// The obstacle.
+    /// The table, or the cylinder round the base.
     pub obstacle: Obstacle,
     /// How deep the part is in the obstacle, in mm.
     pub depth_mm: f64,
@@ -174,7 +174,7 @@ impl std::error::Error for Breach {}
 /// The deepest place of a way inside an obstacle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PathBreach {
-    /// What breaks the guard there.
+    /// The part, the obstacle and the depth at this place.
     pub breach: Breach,
     /// The fraction of the way's duration, 0 to 1.
     pub share: f64,
@@ -196,7 +196,7 @@ impl std::error::Error for PathBreach {}
 pub struct TimedBreach {
     /// The time of the moment at this place, or of the next moment if the place is between two.
     pub time: Duration,
-    /// What breaks the guard there.
+    /// The part, the obstacle and the depth at this place.
     pub breach: Breach,
 }
 

@@ -18,7 +18,7 @@ pub struct StraightLineError {
     pub length_mm: f64,
     /// The position of the tip at the point, in millimetres.
     pub tip: Vector,
-    /// The reason.
+    /// Why the arm cannot follow the line at this point.
     pub fault: StraightLineFault,
 }
 
@@ -31,14 +31,14 @@ pub enum StraightLineFault {
     Guarded(Breach),
     /// A joint would have to jump, because the line passes a singular position.
     Singular {
-        /// The number of the joint.
+        /// The number of the joint, from 1.
         joint: u8,
         /// The necessary turn in degrees.
         degrees: f64,
     },
     /// A joint would have to turn faster than 190 degrees/s, the largest value of its speed register (D10).
     TooFast {
-        /// The number of the joint.
+        /// The number of the joint, from 1.
         joint: u8,
         /// The necessary speed in degrees/s.
         degrees_per_second: f64,

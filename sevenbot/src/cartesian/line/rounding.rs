@@ -25,7 +25,7 @@ pub enum TargetResolution {
 }
 
 impl TargetResolution {
-    /// Time between two targets.
+    /// The longest time between two targets of a line.
     #[must_use]
     pub const fn period(self) -> Duration {
         match self {

@@ -69,7 +69,6 @@ impl SimulatedServo {
 pub(crate) struct SimulatedWire {
     pub(crate) servos: Vec<SimulatedServo>,
     pub(crate) has_echo: bool,
-    /// The delay of an echo.
     pub(crate) echo_delay: Duration,
     /// After this many frames the port fails.
     pub(crate) frames_until_lost: Option<usize>,
@@ -81,7 +80,6 @@ pub(crate) struct SimulatedWire {
     simulated: Duration,
     /// Bytes and their times of arrival, in the order of arrival.
     in_transit: VecDeque<(Duration, Vec<u8>)>,
-    /// All frames sent.
     pub(crate) sent: Vec<Vec<u8>>,
 }
 

@@ -18,7 +18,6 @@ pub(crate) const IDENTITY: [u8; 8] = [7, 30, 1, 2, 3, 4, 5, 6];
 /// The present positions in [`moving_registers`].
 pub(crate) const POSE: [u8; 7] = [120, 90, 65, 90, 90, 90, 0];
 
-/// The frame of a reply.
 pub(crate) fn reply(address: u8, values: &[u8]) -> Vec<u8> {
     let mut frame = FrameBuffer::new();
     Reply { address, values }.encode(&mut frame);
@@ -90,7 +89,6 @@ pub(crate) fn makers_arm() -> (String, TTYPort) {
     })
 }
 
-/// The fault of a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum LineFault {
     Lost,

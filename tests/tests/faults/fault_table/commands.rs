@@ -40,13 +40,12 @@ pub(crate) enum Asked {
     Stop,
     /// To make the motors hold the arm: motor state 1, with torque on all joints.
     Hold,
-    /// To set a register.
+    /// To set a register: its address and its value.
     Register(u8, u8),
     /// To write a recording whose last pose is the pose of the arm at the end of the command.
     Record,
 }
 
-/// Files for the commands.
 pub(crate) const FILES: [(&str, &str); 3] = [
     ("move.txt", "7bot-recording 1\n0 90 90 65 90 90 90 80 0\n1.5 110 105 65 90 90 90 80 0\n"),
     (
@@ -120,7 +119,6 @@ impl Command {
     }
 }
 
-/// All rows.
 pub(crate) const COMMANDS: [Command; 37] = [
     still("info", Moment::Request(3), Asked::Words),
     still("status", Moment::Request(2), Asked::Words),

@@ -17,7 +17,6 @@ pub(crate) struct Fault {
 /// What happens, and when.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Effect {
-    /// Nothing.
     Nothing,
     /// A fault of the simulator that begins before the command.
     Before(&'static str),

@@ -63,7 +63,7 @@ pub(crate) struct Cell {
 }
 
 impl Cell {
-    /// The exit status as text.
+    /// The exit status as text; `-` if there is none.
     pub(crate) fn status_text(&self) -> String {
         self.status.map_or("-".to_owned(), |status| status.to_string())
     }

@@ -18,7 +18,7 @@ fn shown(teacher: &mut Tab, holds: impl Fn(&Value) -> bool) -> Value {
     teacher.hear_where("class", holds)
 }
 
-/// The tile with this name.
+/// The tile of the pupil with this name; null if there is none.
 fn tile<'a>(class: &'a Value, name: &str) -> &'a Value {
     let tiles = class["pupils"].as_array().expect("tiles");
     tiles.iter().find(|tile| tile["name"] == name).unwrap_or(&Value::Null)

@@ -83,7 +83,6 @@ impl AddAssign for Tally {
     }
 }
 
-/// A wire that carries frames.
 trait Wire: Send {
     fn send(&mut self, bytes: &[u8]);
     /// The next frame; `None` if none arrives within [`LOST`].
@@ -129,7 +128,7 @@ impl Map {
         }
     }
 
-    /// Asks for reports.
+    /// The write that asks for reports.
     fn subscribe(self, hertz: u8) -> Vec<u8> {
         match self {
             Self::V22 => self.write(FEEDBACK_FREQUENCY, hertz),

@@ -222,7 +222,6 @@ impl WebClient {
         }
     }
 
-    /// Sends a message.
     pub(crate) fn send(&mut self, text: &str) {
         self.0.send(Message::text(text)).expect("the server takes messages");
     }
@@ -243,7 +242,6 @@ impl WebClient {
         message.to_text().ok().and_then(|text| serde_json::from_str(text).ok())
     }
 
-    /// Reads registers.
     #[track_caller]
     pub(crate) fn read(&mut self, address: u8, count: u8) -> Vec<u8> {
         self.send(&format!(r#"{{"cmd":"read","id":{address},"num":{count}}}"#));

@@ -13,7 +13,7 @@ use protocol_core::request::Request;
 use protocol_core::time::Duration;
 use protocol_core::wire::FrameBuffer;
 
-/// The input of a run.
+/// The configuration, the stored settings, and the steps of a run.
 #[derive(Arbitrary, Debug)]
 pub struct Input<'a> {
     stored: Option<[u8; Image::LENGTH]>,

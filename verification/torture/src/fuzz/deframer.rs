@@ -14,7 +14,7 @@ use arbitrary::Arbitrary;
 use protocol_core::time::{Duration, Instant};
 use protocol_core::wire::{Deframer, ToArm};
 
-/// The input of a run.
+/// A stream with silences, the size of its pieces, and whether frames are pulled late.
 #[derive(Arbitrary, Debug)]
 pub struct Input<'a> {
     steps: Vec<StreamStep<'a>>,

@@ -16,7 +16,7 @@ use tempfile::NamedTempFile;
 static FILE: LazyLock<NamedTempFile> = LazyLock::new(|| NamedTempFile::new_in("/dev/shm").expect("a file"));
 const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 
-/// The input of a run.
+/// The content of the file, and the settings that replace those in it.
 #[derive(Arbitrary, Debug)]
 pub struct Input<'a> {
     filled_with: u8,

@@ -5,7 +5,7 @@ use crate::shared::journal_world::World;
 use arbitrary::Arbitrary;
 use flash_model::{Cut, EraseTear, ProgramTear};
 
-/// The input of a run.
+/// The size of the sectors, and what happens in each power cycle.
 #[derive(Arbitrary, Debug)]
 pub struct Input {
     size: SectorSize,

@@ -15,7 +15,7 @@ pub mod register_ops;
 /// The name of a target, and a function that runs the bytes of a corpus file.
 pub type Target = (&'static str, fn(&[u8]));
 
-/// All targets.
+/// All targets. The name of each is also that of its corpus in `verification/fuzz/corpus/`.
 pub const TARGETS: [Target; 6] = [
     ("controller", |bytes| feed(bytes, |input| controller::run(&input))),
     ("deframer", |bytes| feed(bytes, |input| deframer::run(&input))),

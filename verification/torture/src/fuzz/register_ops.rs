@@ -4,7 +4,7 @@ use arbitrary::Arbitrary;
 use protocol_core::registers::map::{FRAMES_ACCEPTED, FRAMES_CORRUPTED};
 use protocol_core::registers::{Image, Map, RegisterFile};
 
-/// The input of a run.
+/// The steps of a run: requests, measured values, counts and restarts.
 #[derive(Arbitrary, Debug)]
 pub struct Input<'a> {
     steps: Vec<RegisterStep<'a>>,
@@ -20,7 +20,6 @@ enum RegisterStep<'a> {
         address: u8,
         count: u8,
     },
-    /// A write in map 2.1.
     WriteMap21 {
         address: u8,
         values: &'a [u8],

@@ -28,15 +28,15 @@ pub struct LoadArgs {
     pub pid: Option<u32>,
 }
 
-/// Why a load failed.
+/// Why a load did not begin, or ended early.
 #[derive(Debug, thiserror::Error)]
 pub enum LoadError {
-    /// The port cannot be opened.
+    /// The port cannot be opened, for example because no simulator serves it.
     #[error("cannot open {port}: {cause}: is the simulator running?")]
     Port {
-        /// The name of the port.
+        /// The port as it was given on the command line.
         port: String,
-        /// The cause.
+        /// The reason that the library of serial ports gives.
         cause: serialport::Error,
     },
     /// A read or a write of the port failed, for example because the port was removed.

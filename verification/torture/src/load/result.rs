@@ -6,7 +6,7 @@ use std::time::Duration;
 use super::memory::Memory;
 use super::round_trips::RoundTrips;
 
-/// The counts of a load.
+/// The counts and times of a load, and the memory of the other end. It prints itself as text.
 #[derive(Debug, Default)]
 pub struct LoadResult {
     pub(super) reads: u64,

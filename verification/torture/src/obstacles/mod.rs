@@ -23,7 +23,7 @@ pub use mishap::Mishap;
 pub use simulated::SimulatedObstacleArm;
 pub use wall::{WallCase, WallResult, push_against_wall};
 
-/// The experiments of a run.
+/// The cases at walls and of mishaps, and how long things stay between the claws.
 #[derive(Clone, Debug)]
 pub struct Experiments {
     walls: Vec<WallCase>,

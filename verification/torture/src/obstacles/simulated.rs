@@ -12,7 +12,7 @@ use protocol_core::wire::FrameBuffer;
 
 use super::arm::ObstacleArm;
 
-/// A simulated arm.
+/// A simulated arm in virtual time, for `torture obstacles`.
 pub struct SimulatedObstacleArm {
     world: SimulatedArm<Flash>,
     now: Instant,

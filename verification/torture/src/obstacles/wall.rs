@@ -54,7 +54,6 @@ pub struct WallCase {
 }
 
 impl WallCase {
-    /// The payloads, in grams.
     pub(super) const PAYLOADS_G: [u16; 3] = [0, 100, 300];
 
     /// Each joint but the claw in each pose, with each payload, at each speed, by a target and by a stream. The side of the

@@ -37,7 +37,6 @@ const BELIEVED_SPEED: u16 = 1_900;
 /// The largest number of kept bytes of an incomplete reply: one less than the longest complete reply has.
 const MAX_REPLY: usize = 32;
 
-/// Whether a servo replies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Availability {
     /// The servo has replied to every read since this time.

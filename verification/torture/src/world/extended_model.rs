@@ -19,7 +19,7 @@ pub(crate) const WATCHDOG_ACTION: u8 = 187;
 pub(crate) const LIMITS: u8 = 188;
 /// The content of a report (D26).
 pub(crate) const REPORT_CONTENT: u8 = 189;
-/// The joints that were measured.
+/// The joints that were measured, bit n-1 = joint n.
 const MEASURED: u8 = 190;
 /// A fine position before the first reading.
 const UNKNOWN: u16 = 65_535;

@@ -8,7 +8,6 @@ const CRC: Crc<u16> = Crc::<u16>::new(&CRC_16_MODBUS);
 /// The bytes of the longest frame.
 pub(super) const MAX_LENGTH: usize = 262;
 
-/// A request of the host.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum HostRequest {
     Read { address: u8, count: u8 },

@@ -24,7 +24,6 @@ pub(super) const COOL: u8 = 75;
 /// The shortest time from the end of an alarm until its joint engages again: 500 ms (D28), less the delay of an answer.
 const ALARM_OVER: Duration = Duration::from_millis(400);
 
-/// The truth about one joint.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct JointTruth {
     is_on: bool,

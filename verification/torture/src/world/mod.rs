@@ -76,18 +76,18 @@ const HOST_PAUSE: Duration = Duration::from_millis(100);
 /// A world that violated a rule.
 #[derive(Debug)]
 pub struct FailedWorld {
-    /// Its seed.
+    /// Its seed. The same seed and scenario repeat the world.
     pub seed: u64,
-    /// Its scenario.
+    /// Its scenario, which was given or which the seed selected.
     pub scenario: &'static Scenario,
-    /// The rule that was violated.
+    /// The rule whose violation ended the world.
     pub violation: Violation,
     /// The last events, the time of the violation and the parameters of the world.
     pub log: String,
 }
 
 impl TortureWorld {
-    /// The world of a seed.
+    /// A world at its start. `seed` determines all that is random in it.
     #[must_use]
     pub fn new(seed: u64, scenario: &'static Scenario) -> Self {
         let mut rng = SeededRng::new(seed);

@@ -45,7 +45,6 @@ const OVERRUN_TIME: Duration = Duration::from_millis(1_000);
 /// A joint that is given torque may still fall, or approach an older goal, for this time.
 const SETTLE_TIME: Duration = Duration::from_millis(200);
 
-/// The checker of all joints.
 #[derive(Debug)]
 pub(super) struct MotionChecker {
     joints: PerJoint<JointBounds>,
@@ -82,7 +81,6 @@ impl MotionChecker {
         self.joints[joint].overruns_until = now + OVERRUN_TIME;
     }
 
-    /// Exempts all joints.
     pub(super) fn exempt_all(&mut self, now: Instant, exemption: Exemption) {
         Joint::ALL.into_iter().for_each(|joint| self.exempt(now, joint, exemption));
     }

@@ -5,11 +5,8 @@ use protocol_core::registers::Joint;
 /// An event that is due at a later time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Ending {
-    /// The wall is removed.
     Wall(Joint),
-    /// The push is over.
     Push(Joint),
-    /// The thing is removed.
     Thing,
     /// The supply is back.
     Stop,

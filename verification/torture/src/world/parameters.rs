@@ -8,7 +8,6 @@ use protocol_core::time::Duration;
 use super::settings_storage::{BOARD_SECTOR, FlashSettings, SettingsStorage};
 use crate::seeded_rng::SeededRng;
 
-/// The parameters of a world.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct WorldParameters {
     /// Bytes of a flash sector.

@@ -34,7 +34,6 @@ pub(super) struct Push {
     pub(super) is_overloaded: bool,
 }
 
-/// The rule for one joint.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct PushRule {
     /// The last time at which the controller could not limit.

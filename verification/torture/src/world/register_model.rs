@@ -45,7 +45,6 @@ pub(crate) enum RequestEffect {
     Alarm { kind: u8 },
 }
 
-/// The modelled registers.
 #[derive(Clone, Debug)]
 pub(crate) struct RegisterModel {
     values: [u8; 256],

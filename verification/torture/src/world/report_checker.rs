@@ -5,7 +5,6 @@ use protocol_core::time::{Duration, Instant};
 
 use crate::violation::{Check, ensure};
 
-/// A stream of reports.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum ReportStream {
     /// The reports of register 53.
@@ -17,7 +16,6 @@ pub(super) enum ReportStream {
 }
 
 impl ReportStream {
-    /// The stream of a frame.
     pub(super) const fn of(frame: &[u8]) -> Self {
         match frame {
             [_, _, 5, 83, ..] => Self::Angles,
@@ -49,7 +47,6 @@ struct ReportCount {
     disturbed: bool,
 }
 
-/// The reports of all streams.
 #[derive(Debug)]
 pub(super) struct ReportChecker([ReportCount; 3]);
 

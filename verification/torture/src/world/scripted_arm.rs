@@ -115,12 +115,10 @@ impl ScriptedArm {
         self.send(&frame)
     }
 
-    /// Sends a goal in counts.
     pub(super) fn goal(&mut self, joint: Joint, counts: u16) -> Check {
         self.send(&goal_frame(joint, counts))
     }
 
-    /// Sets a torque switch.
     pub(super) fn torque(&mut self, joint: Joint, torque: Torque) -> Check {
         self.send(&torque_frame(joint, torque))
     }

@@ -60,7 +60,6 @@ struct Known {
     positions: [Option<(u16, u16)>; 2],
 }
 
-/// The knowledge about all servos.
 #[derive(Clone, Debug)]
 pub(super) struct ServoReplies {
     codes: TorqueCodes,

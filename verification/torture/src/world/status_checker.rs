@@ -22,7 +22,6 @@ pub(super) use context::StatusContext;
 pub(super) use move_time::affects_motion;
 use move_time::{distance, rest_by};
 
-/// The time between two checks.
 pub(super) const CHECK_PERIOD: Duration = Duration::from_millis(250);
 /// A lost or found servo is reported within this time, even after a restart and with all other servos silent.
 const DETECTION_TIME: Duration = Duration::from_millis(2_500);
@@ -133,7 +132,6 @@ impl StatusChecker {
         (before != missing).then_some((missing & !before, before & !missing))
     }
 
-    /// Checks the whole status.
     pub(super) fn check(&mut self, context: &StatusContext<'_>) -> Check {
         self.next_at = context.now + CHECK_PERIOD;
         for joint in Joint::ALL {

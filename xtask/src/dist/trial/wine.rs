@@ -22,7 +22,6 @@ __declspec(dllimport) BOOLEAN __stdcall SystemFunction036(void *, unsigned long)
 __declspec(dllexport) int __stdcall ProcessPrng(unsigned char *to, unsigned long long count)
 { return SystemFunction036(to, (unsigned long)count); }
 ";
-/// Joints of the arm.
 const JOINTS: usize = 7;
 const COMPILER: &str = "x86_64-w64-mingw32-gcc";
 /// Seconds after which a program in Wine has failed: its server may wait for ever.
@@ -33,7 +32,6 @@ struct Wine {
     folder: TempDir,
 }
 
-/// Tries the program.
 pub(super) fn programs(release: &Release) -> TaskResult {
     let wine = Wine::with(&release.path(&archive_name(release, WINDOWS)))?;
     let version = wine.output(&["--version"])?;

@@ -18,7 +18,6 @@ use simulator::{Outcome, Simulator, frame, receive_reply};
 
 /// Number of starts of a program.
 const STARTS: usize = 51;
-/// Number of measured round trips.
 const ROUND_TRIPS: usize = 5_001;
 /// Numbers of arms in one simulator.
 const SIZES: [usize; 4] = [1, 10, 100, 1_000];

@@ -32,7 +32,6 @@ const TIMEOUT: Timespec = Timespec { tv_sec: 20, tv_nsec: 0 };
 /// Bytes of the reply to a read of seven registers.
 const REPLY_BYTES: usize = 14;
 
-/// A running simulator.
 pub(crate) struct Simulator {
     process: Child,
     ports: Vec<PathBuf>,
@@ -166,7 +165,6 @@ fn wait_for_bytes(port: &File) -> Outcome {
     }
 }
 
-/// The frame of a request.
 pub(crate) fn frame(request: Request<'_>) -> Vec<u8> {
     let mut buffer = FrameBuffer::new();
     request.encode(&mut buffer);

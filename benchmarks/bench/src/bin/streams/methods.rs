@@ -20,7 +20,6 @@ pub(super) trait SetPoints {
     fn step(&mut self, now: f64) -> f64;
 }
 
-/// A method by its name.
 pub(super) struct Method {
     pub(super) name: &'static str,
     pub(super) new: fn(period: f64) -> Box<dyn SetPoints>,
@@ -117,7 +116,6 @@ impl SetPoints for OnePeriod {
     }
 }
 
-/// A straight line.
 #[derive(Clone, Copy, Default)]
 struct Segment {
     from: f64,

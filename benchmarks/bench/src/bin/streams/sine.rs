@@ -134,7 +134,6 @@ fn differences(values: &[f64]) -> impl Iterator<Item = f64> {
     values.iter().skip(1).zip(values).map(|(after, before)| after - before)
 }
 
-/// The frame of a request.
 fn frame(request: Request<'_>) -> Vec<u8> {
     let mut buffer = FrameBuffer::new();
     request.encode(&mut buffer);

@@ -12,7 +12,7 @@ use system_tests::relay::Passing;
 const DIGITS: u32 = 4;
 /// The number of values of a target. Each target is a digit in this base.
 const BASE: u64 = 100;
-/// The lowest target.
+/// The lowest target, in degrees.
 const LOWEST: u64 = 40;
 /// The number of latest writes whose times are kept.
 const KEPT: u64 = 1 << 20;

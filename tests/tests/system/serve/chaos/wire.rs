@@ -24,7 +24,6 @@ const RECEIVE_TIME: Duration = Duration::from_millis(100);
 /// A server that takes no bytes for this time has failed.
 const SEND_TIME: Duration = Duration::from_secs(30);
 
-/// A way to the server.
 #[derive(Clone, Debug)]
 pub(crate) enum WayIn {
     Terminal(PathBuf),

@@ -13,7 +13,6 @@ use crate::serve::served::{Served, read_until, web_frame, web_handshake};
 
 /// The host-link watchdog, in units of 10 ms.
 const HOST_WATCHDOG: u8 = 186;
-/// Bytes without a frame.
 const NO_FRAMES: &[u8] = &[0xAA, 0x77, 0x06, 0xAA, 0x77, 0xAA, 0xFF, 0x00, 0x77, 0x03];
 
 /// What the other programs do.
@@ -33,7 +32,6 @@ pub(crate) enum Attack {
     WebTargets,
     /// A message of the WebSocket without an end.
     Fragments,
-    /// Bytes that are no frames.
     NoFrames,
     /// Programs that set a watchdog and are silent for longer than its time.
     Watchdogs,
@@ -56,7 +54,6 @@ impl Attack {
         Self::Connections,
     ];
 
-    /// How many programs attack.
     pub(crate) const fn attackers(self) -> usize {
         match self {
             Self::Stream => 0,

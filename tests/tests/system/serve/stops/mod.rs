@@ -69,7 +69,6 @@ struct Sent {
 
 type Line = Arc<Mutex<Sent>>;
 
-/// How long a stop took.
 struct StopTimes {
     /// From the write that holds the arm to its arrival on the arm's line.
     to_arm: Duration,

@@ -34,7 +34,6 @@ impl Program {
         vec![terminal, Self::over_unix(served), Self::over_tcp(served)]
     }
 
-    /// A program on a pseudo-terminal.
     pub(crate) fn on_terminal(path: &Path) -> Self {
         let terminal = serialport::new(path.to_str().expect("text"), 115_200).timeout(TIMEOUT).open();
         Self(Box::new(terminal.expect("a port")))
@@ -47,7 +46,6 @@ impl Program {
         Self(Box::new(local))
     }
 
-    /// A program over TCP.
     pub(crate) fn over_tcp(served: &Served) -> Self {
         Self(Box::new(log_in(served)))
     }

@@ -106,7 +106,6 @@ impl DisturbedBus {
         self.plant.move_by_hand(joint, counts);
     }
 
-    /// The hand releases the joint.
     pub(crate) fn release_by_hand(&mut self, joint: Joint) {
         self.plant.let_go(joint);
     }
