@@ -21,7 +21,7 @@ impl<F: NorFlash, C: ArmController> SimulatedArm<F, Plant, C> {
         self.clear_host_line();
     }
 
-    /// Is the arm on? False from [`SimulatedArm::power_off`] until the controller starts again.
+    /// Is the arm on? False from [`SimulatedArm::power_off`] until [`SimulatedArm::power_cycle`].
     #[must_use]
     pub const fn has_power(&self) -> bool {
         !self.is_off
@@ -48,7 +48,10 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
     pub fn restart_controller(&mut self, now: Instant) {
         self.record_action(now, Action::RestartController);
         self.simulate(now, false);
-        self.start_controller(now, fault::WATCHDOG_RESTART);
+        // Without power the controller does not start.
+        if !self.is_off {
+            self.start_controller(now, fault::WATCHDOG_RESTART);
+        }
     }
 
     /// Stops the controller at `now`, as if its program hung. It sends and receives nothing until

@@ -153,6 +153,10 @@ fn without_power_nothing_answers_and_after_it_the_arm_starts() {
     arm.advance(millis(1_000));
     assert!(arm.plant().angle(FOREARM) > before + 20_000, "it falls");
     assert_eq!((arm.take_received(), arm.plant().supply_decivolts()), (vec![], 0));
+    arm.restart_controller();
+    arm.send_request(&read);
+    arm.advance(millis(1_000));
+    assert_eq!(arm.take_received(), [], "no controller starts without power");
     arm.power_cycle();
     arm.advance(millis(2_000));
     assert_eq!(arm.take_received(), [], "the read was lost");
