@@ -231,7 +231,7 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
     }
 
     /// The last host disconnects: the bytes on the line to this host are lost. The arm executes the bytes that the host sent
-    /// before, without sending answers. Then the reports end ([M12](protocol_core::decisions#m12)).
+    /// before, without sending answers. Then this project's controller ends the reports ([M12](protocol_core::decisions#m12)).
     pub fn host_disconnect(&mut self) {
         self.record_action(self.now, Action::Disconnect);
         self.to_host.clear(self.paced_baud());

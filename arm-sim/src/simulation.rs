@@ -251,7 +251,7 @@ impl<C: ArmController> Simulation<C> {
         self.arm.halt_controller(self.now);
     }
 
-    /// The host closes its port: bytes on the line to it are lost, and reports end
+    /// The host closes its port: bytes on the line to it are lost, and this project's controller ends the reports
     /// ([M12](protocol_core::decisions#m12)).
     pub fn disconnect(&mut self) {
         self.arm.host_disconnect();

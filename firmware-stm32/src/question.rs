@@ -53,7 +53,7 @@ impl Question {
         Self { frame, id, length }
     }
 
-    /// The frame as it is sent.
+    /// The bytes for the servo bus, from the header to the checksum.
     #[must_use]
     pub fn frame(&self) -> &[u8] {
         &self.frame

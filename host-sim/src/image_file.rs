@@ -14,7 +14,7 @@ use tracing::warn;
 #[derive(Clone, Debug)]
 pub struct ImageFile {
     memory: Memory,
-    /// Copies share their file.
+    /// Clones share the file.
     file: Option<Arc<File>>,
 }
 

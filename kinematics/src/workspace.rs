@@ -95,8 +95,8 @@ impl Default for Workspace {
 }
 
 impl Workspace {
-    /// The smallest clearance of all parts at these angles of joints 1 to 5, in degrees. Joint 6 turns the disc in itself,
-    /// and joint 7 is no part of the geometry.
+    /// The smallest clearance of all parts. The angles of joints 1 to 5 are in degrees. Joint 6 only turns the disc about its own
+    /// axis, and joint 7 is not in the geometry.
     #[must_use]
     pub fn clearance(&self, [t1, t2, t3, t4, t5]: [f64; 5]) -> Clearance {
         let arm = ArmFrames::of([t1, t2, t3]);

@@ -14,7 +14,7 @@
 
 /// A servo that has shown another goal this often counts as one that does not show goals.
 const HIDDEN_AFTER: u8 = 3;
-/// How often a goal is sent before torque to a servo that does not show it.
+/// How often the goal is sent again, directly before torque, if the servo counts as one that does not show goals.
 const REPEATS: u8 = 3;
 
 /// Whether the servo of one joint has shown its goal.

@@ -72,7 +72,7 @@ struct Tracks {
 
 #[derive(Default)]
 struct Track {
-    /// The stamp of the first moment, since 1970.
+    /// The stamp of the first moment, since 1970; its log time if it has no stamp.
     start: Duration,
     /// The time that the recording gives to the first moment, from the metadata of the topic's channel.
     first_time: Duration,

@@ -24,7 +24,7 @@ pub(crate) struct OutputFile {
     path: PathBuf,
     /// `None` while it is replaced: some file systems of Windows replace no open file.
     file: Option<File>,
-    /// It did not exist before, and is removed unless its result is written.
+    /// It did not exist before, and is removed unless its result is written or [`OutputFile::begin`] was called.
     is_new: bool,
 }
 

@@ -100,7 +100,7 @@ impl FromStr for FineAngle {
     }
 }
 
-/// The degrees: with two decimals, or without any if it is a whole degree and no precision is given.
+/// The degrees with the precision of the format; without one, with two decimals, or with none for a whole degree.
 impl fmt::Display for FineAngle {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         let decimals = out.precision().unwrap_or(if self.is_whole() { 0 } else { 2 });

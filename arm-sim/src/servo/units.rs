@@ -2,7 +2,6 @@
 
 use protocol_core::time::Duration;
 
-/// The duration of a step of a motor.
 pub(crate) const STEP: Duration = Duration::from_millis(1);
 /// A count. Positions are in millionths of a count, so that a count per second is a whole number per step.
 pub(crate) const COUNT: i64 = 1_000_000;

@@ -1,4 +1,4 @@
-//! Late answers of the servos, as behind a USB adapter, positions that jump, and a controller that is called late.
+//! Answers of the servos that are late, as behind a USB adapter; positions that jump; a controller that is called late.
 
 use crate::rig::{Rig, STANDARD_POSE};
 use arm_sim::plant::Wall;

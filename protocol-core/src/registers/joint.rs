@@ -1,4 +1,4 @@
-//! The seven joints of the arm.
+//! The numbers of a joint: 1 to 7 for users, 0 to 6 in arrays and register blocks, a bit in sets.
 
 /// Number of joints, and of servos on the bus.
 pub const JOINTS: usize = 7;

@@ -27,7 +27,7 @@ class ActionLog:
         self._observed = list(positions)
 
     def sent(self, angles: Iterable[SupportsFloat], simulation: sevenbot.Simulation | None) -> None:
-        """The angles that were sent just now."""
+        """Writes the line of an action: the sent angles, the last observed ones, and the true ones of a simulation."""
         if self._file is None:
             return
         nothing = [""] * len(NAMES)

@@ -185,7 +185,7 @@ class ArmNode(Node):
             self._clock_topic.publish(Clock(clock=messages.stamp(self._epoch + simulated)))
 
     def changed(self, text: str) -> None:
-        """Tells the user."""
+        """Logs that the arm was found, is absent or lost, or why it holds."""
         self.get_logger().info(text)
 
     def ended(self) -> None:

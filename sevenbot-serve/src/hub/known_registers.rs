@@ -72,7 +72,8 @@ impl KnownRegisters {
         self.0.word(address)
     }
 
-    /// Does the arm accept a write ([D16](protocol_core::decisions#d16), [M7](protocol_core::decisions#m7))?
+    /// Does the arm accept a write by [D16](protocol_core::decisions#d16) and [M7](protocol_core::decisions#m7)? Does not check the
+    /// limits of [D25](protocol_core::decisions#d25).
     pub(crate) fn accepts(&self, map: Map, address: u8, values: &[u8]) -> bool {
         self.check(map, address, values).is_some()
     }

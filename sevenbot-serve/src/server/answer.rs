@@ -74,7 +74,6 @@ pub(super) fn check_origin<B>(request: &Request<B>, host: &str, is_encrypted: bo
     Ok(())
 }
 
-/// The answer with a file of the page.
 pub(super) fn file<B>(
     files: PageFiles,
     request: &Request<B>,

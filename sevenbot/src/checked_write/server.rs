@@ -10,8 +10,8 @@ use crate::arm::Arm;
 const SERVER: Option<Span> = Span::new(FIRST, 7);
 
 impl Arm {
-    /// Returns the same registers. Where the arm gives no cause and a server in between does not pass writes on, the cause
-    /// becomes the server's reason.
+    /// Fills in missing causes: if a server in between passes no writes on, its reason becomes the cause of each register for
+    /// which the arm gives none.
     pub(crate) fn explained_by_server(&mut self, NotTaken(mut lost): NotTaken) -> NotTaken {
         let is_unknown = |register: &&mut WriteMismatch| register.cause == MismatchCause::Unknown;
         let mut unknown = lost.iter_mut().filter(is_unknown).peekable();

@@ -124,7 +124,7 @@ pub struct Hold {
     stage: Stage,
     /// A read shows the effect of the frames only if it was sent at this time or later.
     written: Duration,
-    /// When the frames that are not confirmed were written last.
+    /// The time of the last write of the unconfirmed frames.
     repeated: Duration,
 }
 

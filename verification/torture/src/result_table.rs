@@ -13,7 +13,7 @@ use crate::world_counts::WorldCounts;
 /// A row: the trial, the amount of work, and the failures.
 pub type ResultRow = [String; 3];
 
-/// The results of a plan as a table.
+/// A row for each scenario, for the total and for each trial, then the seed and the speed of the simulation.
 #[derive(Debug)]
 pub struct ResultTable<'a>(pub &'a CampaignPlan, pub &'a CampaignResult);
 

@@ -52,7 +52,7 @@ pub(super) fn use_zig(command: &mut Command, triple: &str, glibc: &str) -> TaskR
     Ok(())
 }
 
-/// A program that calls `cargo-zigbuild` with these words, and then with its own arguments.
+/// A script that calls `cargo-zigbuild` once, with these words and then the arguments of the script.
 fn zig_script(name: &str, words: &str) -> TaskResult<PathBuf> {
     let (script, zigbuild) = (folder().join(name), python()?.with_file_name("cargo-zigbuild"));
     fs::write(&script, format!("#!/bin/sh\nexec {} {words} \"$@\"\n", zigbuild.display()))?;

@@ -1,5 +1,6 @@
 //! `sevenbot` and the registers that only map 2.1 has, on an arm that serves both maps: `docs/protocol.md`, section 8.
-//! The tool writes these registers with function 04. Such a write must not change reports and offsets of map 2.2.
+//! The tool writes these registers with function 04. Such a write must not change the offsets of map 2.2, nor its reports, unless
+//! it asks for reports of map 2.1 (M4).
 
 use std::fs::{self, File};
 

@@ -1,5 +1,3 @@
-//! The result of a load.
-
 use std::fmt::{self, Display};
 use std::time::Duration;
 

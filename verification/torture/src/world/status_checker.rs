@@ -51,7 +51,7 @@ pub(super) struct StatusChecker {
     bus_errors: u16,
     /// True if the host link was disturbed since the start.
     pub(super) link_was_disturbed: bool,
-    /// Headers in malformed requests. The arm may count each of them as a corrupted frame once.
+    /// Headers in malformed requests that the arm has not counted yet. It may count each as a corrupted frame once.
     pub(super) false_headers: u16,
     pub(super) reports: ReportChecker,
     valve_open_since: Option<Instant>,

@@ -24,7 +24,7 @@ __declspec(dllexport) int __stdcall ProcessPrng(unsigned char *to, unsigned long
 ";
 const JOINTS: usize = 7;
 const COMPILER: &str = "x86_64-w64-mingw32-gcc";
-/// Seconds after which a program in Wine has failed: its server may wait for ever.
+/// The timeout of a program in Wine, in seconds: the server of Wine may wait for ever.
 const LONGEST: &str = "600";
 
 /// Wine, with files of its own, and the program.

@@ -74,7 +74,7 @@ struct StopTimes {
     to_arm: Duration,
     /// Bytes that went to the arm meanwhile.
     bytes: u64,
-    /// From the read of the positions to the reply that confirms them as targets.
+    /// From the first read of the positions to the reply that confirms the targets, with all repeats.
     in_all: Duration,
 }
 
