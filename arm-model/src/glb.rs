@@ -1,4 +1,4 @@
-//! The arm as binary glTF: a node for each link, with a mesh, in the straight pose.
+//! The arm as binary glTF: a node for each link, with a mesh if the link has a shape, in the straight pose.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -24,7 +24,7 @@ const FROM_Z_UP: UnitQuaternion = UnitQuaternion([-0.5, -0.5, -0.5, 0.5]);
 const VECTOR_BYTES: usize = 12;
 
 /// The arm as binary glTF (GLB), in the straight pose. The nodes are the links. To move a joint, turn the node of its link
-/// about the axis of the joint in the URDF.
+/// about the axis of the joint in the URDF. With joint 2, also turn `elbow_link` back.
 ///
 /// # Errors
 /// The bytes cannot be encoded. This does not happen in practice, because they are written to memory.

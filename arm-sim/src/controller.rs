@@ -24,7 +24,8 @@ pub trait ArmController: Clone + Debug {
     /// The next action. Call it until it returns [`Output::Wait`].
     fn poll(&mut self, now: Instant, host_room: usize) -> Output<'_>;
 
-    /// A poll can be delayed until this time without a difference for the host, unless bytes arrive earlier.
+    /// A poll can be delayed until this time without a difference for the host, unless bytes arrive earlier, or the maker's
+    /// controller beeps or wakes up.
     fn host_deadline(&self) -> Instant;
 
     /// Sets the state of the storage, after an [`Output::Save`] and after every change.

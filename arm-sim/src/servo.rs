@@ -169,7 +169,7 @@ impl Servo {
         self.registers.is_addressed_by(frame)
     }
 
-    /// Executes a frame that ends at `now`, and returns the answer if there is one.
+    /// Executes a frame at `now`, and returns the answer if there is one.
     pub fn handle_frame(&mut self, now: Instant, frame: &ServoFrame<'_>) -> Option<ServoAnswer> {
         if !self.is_addressed_by(frame) {
             return None;

@@ -27,7 +27,7 @@ pub trait ServoBus {
     /// Switches the power of the servos off and on, if that is possible.
     fn power_cycle(&mut self, now: Instant);
 
-    /// The simulated servos; `None` for real ones.
+    /// The simulated servos, to disturb them; `None` for real ones, or if the bus does not pass them on.
     fn plant_mut(&mut self) -> Option<&mut Plant> {
         None
     }

@@ -2,10 +2,10 @@
 //!
 //! ```text
 //!   7bot-session 1 program=3.0.0 controller=sevenbot seed=1 chip-id=53494d000001 paced=true ...
-//!   settings aa55...                          the bytes of the settings, without erased ones at the end
-//!   1000000 > aa770102365b9f                  at 1 s: the host starts to send these bytes
+//!   settings 79b8f899...                      the bytes of the settings, without erased ones at the end
+//!   1000000 > aa7703360781ce                  at 1 s: the host starts to send these bytes
 //!   1002430 ~                                 time passes until then, and the host is idle
-//!   1002430 < aa77010336075a5a415a5a5a50..    the host takes these bytes
+//!   1002430 < aa770336075a5a415a5a5a50....    the host takes these bytes
 //!   1003000 =                                 time passes until then, and the host may have sent more
 //!   2000000 ! fault 3=missing                 an action
 //! ```

@@ -239,7 +239,7 @@ impl<C: ArmController> Simulation<C> {
     }
 
     /// Restarts the controller, as its watchdog does. RAM and the bytes on the host line are lost. The servos keep power, torque
-    /// and goals.
+    /// and goals. Has no effect while the arm is off.
     pub fn restart_controller(&mut self) {
         self.to_send.clear();
         self.arm.restart_controller(self.now);

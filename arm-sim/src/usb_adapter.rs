@@ -83,7 +83,7 @@ impl UsbAdapter {
         if is_due { core::mem::take(&mut self.block) } else { Vec::new() }
     }
 
-    /// When the block is sent; `None` if it is empty.
+    /// When the block is sent, unless it is full earlier; `None` if it is empty.
     #[must_use]
     pub fn deadline(&self) -> Option<Instant> {
         (!self.block.is_empty()).then_some(self.due)

@@ -19,7 +19,7 @@ pub(crate) struct Desk {
 }
 
 impl Desk {
-    /// Queues the reason why the real arm was not given.
+    /// Keeps the reason why the real arm was not given, until it is sent or a later reason replaces it.
     pub(crate) const fn refuse(&mut self, why: NotGiven) {
         self.not_given = Some(why);
     }

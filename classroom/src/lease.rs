@@ -2,7 +2,7 @@
 
 use protocol_core::time::{Duration, Instant};
 
-/// The longest time that a pupil can have the arm, in seconds.
+/// The longest time of a lease, in seconds.
 const LONGEST: u32 = 3_600;
 
 /// A lease. Its number distinguishes it from other leases.

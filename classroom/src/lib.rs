@@ -24,7 +24,7 @@
 //!
 //! class.receive(now, teacher, r#""stop_all""#);
 //! assert_eq!(class.next_message(now, mia).as_deref(), Some(r#"{"stop":{"number":1}}"#));
-//! // The class repeats the stop until the tab reports that its arm holds.
+//! // The class repeats the stop until the tab reports that its arm holds or is limp.
 //! let later = now + Duration::from_millis(100);
 //! class.poll(later);
 //! assert_eq!(class.next_message(later, mia).as_deref(), Some(r#"{"stop":{"number":1}}"#));

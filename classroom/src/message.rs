@@ -224,7 +224,7 @@ pub enum NotGiven {
     NoArm,
     /// It does not answer.
     ArmSilent,
-    /// The pupil is not connected.
+    /// The pupil is not connected, or has not answered for 8 s.
     PupilGone,
     /// The time is not 1 to 3600 s.
     BadTime,
@@ -296,7 +296,7 @@ impl From<StopOutcome> for TileStop {
 pub struct StopNews {
     /// The number of the stop, as in [`ToPupil::Stop`].
     pub number: u32,
-    /// The number of arms that were asked to stop.
+    /// The number of arms that were asked to stop, without those of pupils who are no longer in the class.
     pub asked: usize,
     /// The number of arms that have confirmed it.
     pub confirmed: usize,

@@ -6,7 +6,7 @@ use crate::connection::ConnectionId;
 use crate::message::{LeaseEnd, LentArm, Presence, Report, StopOutcome, Tile, ToPupil};
 use crate::stop_all::PendingStop;
 
-/// Time between two questions to a tab that answers.
+/// Time between two questions to a tab that answers. A change of the lease asks at once.
 const ASK_PERIOD: Duration = Duration::from_millis(250);
 /// A tab that does not answer is asked again after this time. The tab takes a silence of 10 s for a dead connection.
 const ASK_AGAIN: Duration = Duration::from_millis(4_000);

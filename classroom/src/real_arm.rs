@@ -79,7 +79,7 @@ impl RealArm {
         true
     }
 
-    /// Takes news of the arm. Returns whether they differ from the previous news, and whether they confirm the stop for all.
+    /// Takes news of the arm. Returns whether they differ from the known state, and whether they confirm the stop for all.
     pub(crate) fn take_news(&mut self, news: ArmNews) -> (bool, bool) {
         let is_new = self.news != news;
         self.news = news;

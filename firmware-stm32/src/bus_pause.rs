@@ -1,7 +1,8 @@
 //! When to save settings. Programming a word stalls the core for 16 to 100 microseconds, and at 1 Mbaud a byte that is not
-//! read within 10 microseconds is lost. So a save waits for a pause on both lines, with a timeout.
+//! read within 10 microseconds is lost. So a save waits until both lines receive nothing and the servo bus sends nothing, with a
+//! timeout. Bytes that are sent to the host meanwhile do not count.
 
-/// A wait for a pause on both lines.
+/// A wait for a pause: nothing is received, and nothing is sent to the servos.
 #[derive(Clone, Copy, Debug)]
 pub struct PauseWait {
     quiet_micros: u32,
@@ -12,8 +13,8 @@ pub struct PauseWait {
 }
 
 impl PauseWait {
-    /// Starts a wait. It ends when no byte was received or sent for `quiet_micros`, or after `timeout_micros`. `now` is the
-    /// value of a microsecond counter that wraps.
+    /// Starts a wait. It ends when no byte was received, and none sent to the servos, for `quiet_micros`, or after
+    /// `timeout_micros`. `now` is the value of a microsecond counter that wraps.
     #[must_use]
     pub const fn new(now: u32, quiet_micros: u32, timeout_micros: u32) -> Self {
         Self { quiet_micros, timeout_micros, start: now, quiet_since: now, received: usize::MAX }

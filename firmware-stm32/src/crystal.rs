@@ -42,7 +42,7 @@ pub fn identify(khz: u32, fitted: &[u8]) -> Option<u8> {
     fitted.iter().copied().find(is_near)
 }
 
-/// True if the PLL can use each of these crystals, in MHz, and a measurement tells them apart.
+/// True if the PLL can use each of these crystals, in MHz, a measurement tells them apart, and they are in rising order.
 #[must_use]
 pub const fn are_distinct(fitted: &[u8]) -> bool {
     // Slice patterns, because a constant expression has no iterators. Crystals have 4 to 26 MHz (DS8626, HSE

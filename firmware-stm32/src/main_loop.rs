@@ -81,8 +81,9 @@ impl MainLoop<'_> {
         }
     }
 
-    /// Waits for a pause on both lines before a save, because programming the flash stops the core. The controller sends
-    /// nothing to the servos meanwhile. Bytes from the host stay in the queue.
+    /// Waits for a pause before a save, because programming the flash stops the core: nothing is received, and nothing is sent to
+    /// the servos. The controller sends nothing meanwhile; bytes to the host that are already queued go on. Bytes from the host
+    /// stay in the queue.
     fn wait_for_pause(&self) {
         let (quiet, timeout) = (board::SAVE_QUIET_MICROS, board::SAVE_TIMEOUT_MICROS);
         let mut pause = PauseWait::new(clock::micros(), quiet, timeout);

@@ -23,7 +23,7 @@ pub enum ResetCause {
     HardFault = 0x7B07_FA17,
     /// The crystal stopped while it clocked the core.
     ClockFailure = 0x7B07_C10C,
-    /// An interrupt or exception without a handler.
+    /// An interrupt or exception without a handler, or peripherals that `main` finds already taken.
     Unexpected = 0x7B07_0DD1,
 }
 

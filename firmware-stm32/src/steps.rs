@@ -20,11 +20,11 @@ use crate::read_only_bus::ReadOnlyBus;
 
 /// Frames that step b sends, unless the bus gives no echo.
 const ECHOES: u16 = 1_000;
-/// Questions that step c sends.
+/// Questions whose answers step c counts.
 const QUESTIONS: u16 = 100;
 /// Time for which step c searches for a servo.
 const SEARCH_MICROS: u32 = 2_000_000;
-/// Time between two lines of step d.
+/// Shortest time between two rounds of step d.
 const LINE_MICROS: u32 = 500_000;
 /// Shown instead of the value of a servo that did not answer.
 const UNKNOWN: i16 = -1;
@@ -234,7 +234,7 @@ impl SelfTest {
         answer.and_then(|(answer, _)| answer.first().copied()).map_or(UNKNOWN, i16::from)
     }
 
-    /// Hangs until the watchdog restarts the chip.
+    /// Hangs until the watchdog restarts the chip. In the emulator, which has no watchdog, it returns.
     fn hang(&mut self) {
         if self.board.source == ClockSource::Emulated {
             say!(self, "w: the emulator has no watchdog");

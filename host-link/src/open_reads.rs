@@ -13,8 +13,9 @@ use crate::span::Span;
 /// A read is repeated as soon as its reply is later than an allowance: twice the recent delay of replies, and
 /// [`ROUND_TRIP`] before the first reply. The time to the next repeat doubles, up to [`ROUND_TRIP`] or the allowance,
 /// whichever is longer. A read whose reply comes damaged is repeated at once. A read changes nothing, so a needless repeat
-/// does no harm. The read is given up `attempts` times `timeout` after the reply to its first attempt was due. So a lost
-/// reply costs little time, several lost replies are no error, and a slow arm gets the whole time.
+/// does no harm. The read is given up `attempts` times `timeout` after the reply to its first attempt was due, or earlier if
+/// its reply is known to be lost and it may not be repeated. So a lost reply costs little time, several lost replies are no
+/// error, and a slow arm gets the whole time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Patience {
     /// The wait for the reply lasts this many times `timeout`, at least once. A read with one attempt is not repeated.

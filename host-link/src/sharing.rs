@@ -100,7 +100,7 @@ pub struct SharingState {
     pub has_one_driver: bool,
     /// Does no arm answer the server?
     pub is_without_arm: bool,
-    /// Writes of this program that were not carried out, wrapping.
+    /// Writes of this program that the server dropped, wrapping.
     pub dropped: u16,
 }
 

@@ -82,7 +82,8 @@ impl Snapshot {
         self.byte(&STATUS_VERSION) == KNOWN_LAYOUT
     }
 
-    /// Takes the values of another snapshot, as far as this one holds their registers.
+    /// Takes the values of another snapshot, as far as this one holds their registers. Takes none if the other one begins at a
+    /// lower register.
     pub fn put(&mut self, other: &Self) {
         let first = usize::from(other.address).checked_sub(usize::from(self.address));
         let held = first.and_then(|first| self.values.get_mut(first..)).unwrap_or_default();

@@ -134,7 +134,8 @@ fn users_own(variable: impl Fn(&str) -> Option<PathBuf>) -> Result<PathBuf, Imag
     Ok(state.ok_or(ImageError::NoStateDirectory)?.join("7bot"))
 }
 
-/// Creates a blank image atomically. If another simulator has created an image in the meantime, its image stays.
+/// Creates a blank image atomically. If another simulator has created an image in the meantime, its image stays, except on a
+/// file system without `RENAME_NOREPLACE`.
 fn make_blank(path: &Path) -> io::Result<()> {
     let mut draft = path.as_os_str().to_owned();
     draft.push(format!(".{}.new", std::process::id()));

@@ -70,7 +70,7 @@ pub struct RealServos<F> {
     search_at: Instant,
     statistics: BusStatistics,
     report_at: Instant,
-    /// Register 242 as it was last logged.
+    /// Register 242 at the last line about the servo bus; `None` before the first line since the port was opened.
     missing: Option<u8>,
 }
 
@@ -100,7 +100,7 @@ impl<F: NorFlash + Clone> RealServos<F> {
     /// Runs until a signal or an error ends it. Then damps the servos, unless [`BusConfig::holds_on_exit`] is set.
     ///
     /// # Errors
-    /// The operating system fails: the host's port, or poll(2).
+    /// The operating system fails: the host's port, inotify or poll(2).
     pub fn run(mut self, clock: &mut RealClock, signals: &mut Signals) -> io::Result<()> {
         let result = self.run_loop(clock, signals);
         self.damp_servos();

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use embedded_storage::nor_flash::NorFlashErrorKind;
 
-/// The most copies of an arm. Each takes about 20 KiB.
+/// The most copies of an arm. Each takes a few KiB, and up to 32 KiB for its settings.
 const SNAPSHOTS: usize = 64;
 /// The longest name, in characters.
 const LONGEST_NAME: usize = 64;

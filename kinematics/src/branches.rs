@@ -1,6 +1,6 @@
 //! All solutions for a position. [`ik5`] and [`ik6`] return the first of them.
 //!
-//! A second one exists only where a joint is at an end: joint 1, where y of the wrist is 0, or joint 4, where the hand
+//! A second one is returned only where a joint is at an end: joint 1, where y of the wrist is 0, or joint 4, where the hand
 //! bends exactly to the side.
 
 use crate::float::Float;

@@ -5,7 +5,7 @@
 use core::fmt::Debug;
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
-/// The number type of positions and angles: `f32` on the chip, `f64` on the host.
+/// The number type of positions and angles: `f32` in the controller, also a simulated one, `f64` in other programs of the host.
 pub trait Float:
     Copy
     + Debug

@@ -54,9 +54,9 @@ pub(crate) const ELBOW_TO_WRIST: f64 = 200.068_113_401_411_37;
 /// The angle between the line from elbow to wrist and the axis of the forearm, in degrees.
 pub(crate) const ELBOW_TO_WRIST_ANGLE: f64 = 7.178_298_211_576_967;
 
-/// The angle of joint 3 at which the forearm is level. Larger angles lower the wrist.
+/// The angle of joint 3 at which the forearm is level. At larger angles it slopes down towards the wrist.
 pub const LEVEL_FOREARM: f64 = 65.0;
-/// The largest angle of a joint. The smallest is 0.
+/// The largest angle of joints 1 to 6. The smallest is 0.
 pub const JOINT_MAX: f64 = 180.0;
 /// The smallest value of [`linkage`](crate::limits::linkage): the elbow is as far open as the parallelogram lets it be.
 pub const LINKAGE_MIN: f64 = 19.0;

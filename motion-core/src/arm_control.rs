@@ -81,7 +81,7 @@ impl ArmControl {
         }
     }
 
-    /// Advances all set-points if a control cycle is due.
+    /// Begins a control cycle if one is due, and advances the set-points of the joints that take goals.
     pub(crate) fn advance(&mut self, now: Instant) {
         if let Some(end) = self.bus.cycle_due(now) {
             self.begin_cycle(now, end);

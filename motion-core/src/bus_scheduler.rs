@@ -5,9 +5,8 @@
 //!   a joint that engages:      goals, a read of its servo, torque
 //! ```
 //!
-//! Goals are sent before torque, and read back, so that no servo gets torque with an old goal. During start-up only reads
-//! are sent.
-//! This file does not know angles.
+//! Goals are sent before torque, and read back, so that a lost frame does not give a servo torque with an old goal: see
+//! goal_check.rs. During start-up only reads are sent. This file does not know angles.
 
 use protocol_core::registers::map::PROTECTION;
 use protocol_core::registers::{JOINTS, Joint, RegisterFile};

@@ -94,7 +94,7 @@ impl Controller {
         // delay the requests behind them.
         self.execute_requests(now, host_room);
         self.arm.advance(now);
-        // The frame that results from an action of the watchdog is sent at once.
+        // The frame that results from an action of the watchdog is sent at once, if the bus is free.
         if self.arm.prepare_servo_frame(now)
             || (self.arm.watchdog_is_due && self.arm.poll_watchdog(now) && self.arm.prepare_servo_frame(now))
         {

@@ -10,9 +10,9 @@
 //!      └── released, from every state ──                        Silent ◀─────────────────┘
 //! ```
 //!
-//! A waiting joint engages at its measured position. Its goal stays there until it has torque, so that the servo does
-//! not jump. A silent joint keeps its set-point, because its servo may still hold there. This file does
-//! not know the bus or which joint it drives.
+//! A waiting joint engages at its measured position or, after a restart of the controller alone, at a near goal that its
+//! servo still holds. Its goal stays there until it has torque, so that the servo does not jump. A silent joint keeps its
+//! set-point, because its servo may still hold there. This file does not know the bus or which joint it drives.
 
 use protocol_core::time::{Duration, Instant};
 
@@ -28,7 +28,7 @@ const REJOIN_WITHIN: MicroDegrees = MicroDegrees::from_degrees(3);
 enum Engagement {
     /// The joint is not driven.
     Released,
-    /// The joint will engage at the next measurement. If the host writes a target meanwhile (`has_target`), the trajectory
+    /// The joint will engage once it is measured at rest. If the host writes a target meanwhile (`has_target`), the trajectory
     /// keeps it.
     Waiting { has_target: bool },
     /// The goal of the joint is the angle at which it engages, or its set-point if it continues after a silence. The servo has
@@ -45,7 +45,7 @@ enum Engagement {
 pub enum Target {
     /// The measured position: the joint holds there.
     Measured,
-    /// The target that the host wrote.
+    /// The target that the host wrote, or the target that the joint had before a silence.
     FromHost,
 }
 
@@ -62,7 +62,7 @@ impl Drive {
     pub const RELEASED: Self =
         Self { engagement: Engagement::Released, trajectory: Trajectory::holding(MicroDegrees(0)) };
 
-    /// Lets the joint engage at the next measurement.
+    /// Lets the joint engage once it is measured at rest.
     pub fn wait(&mut self) {
         self.engagement = Engagement::Waiting { has_target: false };
     }
@@ -146,7 +146,7 @@ impl Drive {
     }
 
     /// The servo has no torque any more: the joint engages anew where it is measured. Unless `keeps_target`, an earlier
-    /// target of the host is forgotten; a target that came during a silence is always kept.
+    /// target of the host is forgotten; a silent joint always keeps a target that came during the silence.
     pub fn lose_torque(&mut self, keeps_target: bool) {
         self.engagement = match self.engagement {
             Engagement::Engaged => {

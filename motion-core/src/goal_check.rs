@@ -25,7 +25,7 @@ pub(crate) struct GoalCheck {
     misses: u8,
     /// The joint may get torque.
     is_done: bool,
-    /// The servo had torque when its joint engaged.
+    /// The servo was known to have torque when its joint engaged.
     had_torque: bool,
 }
 
@@ -39,7 +39,7 @@ impl GoalCheck {
         self.had_torque = had_torque;
     }
 
-    /// Did the servo have torque when its joint engaged?
+    /// Was the servo known to have torque when its joint engaged?
     pub(crate) const fn had_torque(self) -> bool {
         self.had_torque
     }

@@ -65,7 +65,7 @@ pub(crate) struct JointState {
     is_first_engagement: bool,
     /// The last question to the servo was not answered.
     pub(crate) is_unanswered: bool,
-    /// The error bits of the servo's last answer.
+    /// The error bits of the servo's last accepted answer; 0 while it is silent.
     pub(crate) alarms: u8,
     /// The temperature of the servo, in degrees Celsius; 0 while unknown.
     pub(crate) temperature: u8,

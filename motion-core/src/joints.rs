@@ -41,7 +41,7 @@ pub(crate) struct Joints {
 }
 
 impl Joints {
-    /// Joints at power-up. In the servo state each will engage at its measured position.
+    /// Joints at power-up. In the servo state each waits to engage.
     pub(crate) fn new(state: MotorState) -> Self {
         let mut drive = Drive::RELEASED;
         if state == MotorState::Servo {
@@ -297,7 +297,7 @@ impl Joints {
         self.joints.iter().any(|state| state.takes_goal_at(now))
     }
 
-    /// The goals of the driven joints at `now`, in servo counts.
+    /// The goals of the joints that are sent one at `now`, in servo counts.
     pub(crate) fn goals(&self, now: Instant, registers: &RegisterFile) -> impl Iterator<Item = (Joint, u16)> {
         self.each().filter(move |(_, state)| state.takes_goal_at(now)).map(|(joint, state)| {
             (joint, counts_from_angle(joint, state.drive.set_point(), registers.offset(joint)))
@@ -305,7 +305,7 @@ impl Joints {
     }
 
     /// The torque for each servo; `None` leaves the switch unchanged. The caller has to send all of them: from now on
-    /// joints whose torque was pending may move.
+    /// joints that are given torque may move.
     pub(crate) fn take_torque(&mut self, is_protected: bool) -> [Option<Torque>; JOINTS] {
         let mut switches = [None; JOINTS];
         for (switch, joint) in switches.iter_mut().zip(&mut self.joints) {

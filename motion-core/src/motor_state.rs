@@ -11,7 +11,7 @@ use crate::servo_bus::Torque;
 pub enum MotorState {
     /// No joint is driven; the motors brake.
     Damping,
-    /// Every joint whose servo answers is driven to its target.
+    /// The joints are driven to their targets.
     Servo,
     /// No joint is driven; the arm can be moved by hand.
     Forceless,

@@ -40,7 +40,7 @@ const JITTER_COUNTS: u32 = 8;
 pub enum FilterOutcome {
     /// The position of the joint, in servo counts.
     Accepted(u16),
-    /// The position is out of reach of the previous answer.
+    /// The position is out of reach of the previous answer, or there is no previous answer.
     Rejected,
     /// The position is rejected, and the two reads before brought no accepted answer either: the servo counts as silent
     /// from now on.
@@ -146,7 +146,7 @@ impl PositionFilter {
         self.last.is_some_and(|(_, then)| now - then <= FRESH_FOR)
     }
 
-    /// When the servo answered last; `None` if it is silent.
+    /// When the servo answered last; `None` if it has not answered since it fell silent.
     #[must_use]
     pub fn heard_at(&self) -> Option<Instant> {
         self.last.map(|(_, then)| then)

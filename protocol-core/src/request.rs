@@ -75,7 +75,7 @@ pub struct Reply<'a> {
 }
 
 impl<'a> Reply<'a> {
-    /// The reply in a frame that the host received; `None` for any other frame.
+    /// The reply, or the report of map 2.2, in a frame that the host received; `None` for any other frame.
     #[must_use]
     pub const fn from_frame(frame: Frame<'a>) -> Option<Self> {
         match frame.function {

@@ -34,7 +34,7 @@ class MujocoArm:
         self.arms = sevenbot.SimulatedArms(1)
         self.model = mujoco.MjModel.from_xml_string(xml)
         self.data = mujoco.MjData(self.model)
-        # The model's zero is the pose of rest. Joints and actuators have the names of the registers.
+        # The model's zero is the pose of rest. The actuator of a joint has the joint's name.
         names = [f"joint_{number}" for number in range(1, JOINTS + 1)]
         joints = [self.model.joint(name) for name in names]
         self.positions = np.array([joint.qposadr[0] for joint in joints])

@@ -63,7 +63,7 @@ class Arm:
         try:
             return await asyncio.shield(future)
         except asyncio.CancelledError:
-            # The arm holds before the cancellation goes on. The call ends with `Interrupted`, or does not begin.
+            # The arm holds before the cancellation goes on. A move ends with `Interrupted`, or does not begin.
             call.cancel()
             await asyncio.to_thread(self.sync.stop)
             while not call.done():
@@ -229,7 +229,7 @@ class Stream:
     ) -> int:
         """Sends each point of an iterator, or of an asynchronous one. Returns how many it sent.
 
-        If the next point takes longer than the watchdog's time, the arm holds.
+        If the next point takes longer than the watchdog's time, the watchdog of the arm acts.
         """
         count = 0
         if isinstance(points, AsyncIterable):

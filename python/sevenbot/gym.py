@@ -53,7 +53,7 @@ FAULTS = (
     "1=push=300",
 )
 SIZES = np.array([180] * 7 + [200] * 7 + [100] * 7 + [300] * 3, dtype=np.float32)
-"""What the numbers of an observation are divided by."""
+"""What the first 24 numbers of an observation are divided by."""
 
 
 class _Arms:

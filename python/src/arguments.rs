@@ -167,7 +167,8 @@ pub(crate) fn guard(py: Python<'_>, table: Option<f64>, guard: bool) -> PyResult
     }
 }
 
-/// The rule for the way to a first point: it takes `seconds`. With `None` the first point has to be near.
+/// The rule for the way to a first point: it takes `seconds`, or longer if a joint would be too fast. With `None` the first point
+/// has to be near.
 pub(crate) fn approach(py: Python<'_>, seconds: Option<f64>) -> PyResult<ApproachRule> {
     match seconds {
         None => Ok(ApproachRule::Near),

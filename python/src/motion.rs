@@ -40,7 +40,7 @@ pub(crate) fn known_angles(arm: &mut Arm) -> Result<[f64; 7], MoveError> {
     Ok(angles)
 }
 
-/// The measured angles in degrees, as exact as the arm has them.
+/// The measured angles in degrees: the fine ones if the arm has all seven, or else whole degrees.
 fn angles(arm: &mut Arm) -> Result<[f64; 7], Error> {
     let fine = arm.fine_state_if_served()?.map_or([None; 7], |state| state.positions);
     if let [Some(a), Some(b), Some(c), Some(d), Some(e), Some(f), Some(g)] = fine {

@@ -33,7 +33,8 @@ pub(crate) struct PacedStream<'a> {
     pub(crate) pace: StreamPace,
     pub(crate) first: FirstPoints,
     pub(crate) rule: ApproachRule,
-    /// The last point of each joint in degrees; for a joint without a point, its target at the start.
+    /// The last point of each joint that `send` sent, in degrees; before it, the joint's target when the stream began, or began
+    /// again.
     pub(crate) pose: [f64; 7],
     /// The points of a program that does not wait, and what it offers.
     pub(crate) points: LatestPoints,

@@ -22,7 +22,7 @@ ENOUGH = 120.0
 
 
 def actions(n: int, step: int) -> NDArray[numpy.float64]:
-    """Angles near the pose of rest, different for each arm and step."""
+    """Angles near the pose of rest, which differ between neighbouring arms and steps."""
     turns = numpy.add.outer(numpy.arange(n) * 7 + step * 3, numpy.arange(7) * 5) % 11
     angles: NDArray[numpy.float64] = numpy.array(REST) + turns - 6.0
     return angles

@@ -51,7 +51,7 @@ class Cell:
 
 @dataclass
 class Seen:
-    """The arm at the end of the call and some time later. `registers` is None if the arm does not answer."""
+    """The arm at the end of the call and some time later. `registers` is None if the arm is closed or does not answer."""
 
     at_end: Angles
     later: Angles

@@ -211,4 +211,4 @@ def test_a_park_pose_that_cannot_be_kept_is_told(
     for name in ["HOME", "XDG_CONFIG_HOME"]:
         monkeypatch.delenv(name, raising=False)
     with pytest.raises(OSError, match="parked, but the pose is not kept"):
-        simulated_arm.park(None, 0, 90, 48, keep=True)
+        simulated_arm.park(None, 90, 0, 90, 48, None, None, keep=True)

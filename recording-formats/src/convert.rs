@@ -1,4 +1,4 @@
-//! Converts a recording, and keeps all that the new format can hold.
+//! Converts a recording, and keeps the messages that the new format can hold.
 
 use std::io::{Read, Write};
 

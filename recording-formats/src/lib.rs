@@ -7,7 +7,8 @@
 //!                      an arm ──▶ McapWriter ────────▶        the same, while it moves
 //! ```
 //!
-//! The topics of an MCAP file are named as in `ros/sevenbot_ros`. Its angles are in radians, and it is not compressed.
+//! The topics of an MCAP file are named as in `ros/sevenbot_ros`; `/vacuum` is an addition. Its angles are in radians, and it is
+//! not compressed.
 //!
 //! ```
 //! use recording_formats::{Format, read, write};

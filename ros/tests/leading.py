@@ -25,7 +25,7 @@ def level(client: Client) -> tuple[int, str]:
 
 
 def healthy(client: Client) -> None:
-    """Waits until the next diagnosis tells of no error."""
+    """Waits until a new diagnosis tells of no error."""
     client.diagnostics.clear()
     client.until(lambda: client.diagnostics and level(client)[0] < 2, "health")
 

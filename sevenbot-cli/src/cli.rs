@@ -64,7 +64,8 @@ pub(crate) struct Cli {
 }
 
 impl Cli {
-    /// Parses `arguments`, of which the first is the name of the program. Errors about numbers are in plain words.
+    /// Parses `arguments`, of which the first is the name of the program. An error about a whole number that cannot be
+    /// parsed is in plain words.
     pub(crate) fn from_arguments(arguments: impl Iterator<Item = OsString>) -> Result<Self, clap::Error> {
         let matches = with_negative_numbers(Self::command()).try_get_matches_from(arguments);
         matches.and_then(|matches| Self::from_arg_matches(&matches)).map_err(in_plain_words)

@@ -17,7 +17,7 @@ use sevenbot::{Error, OpenError};
 use crate::advice::{self, START_SIMULATOR, owned};
 use crate::style::BAD;
 
-/// The exit status after Ctrl-C: 128 plus the number of SIGINT, as in shells.
+/// The exit status of a command that Ctrl-C interrupted: 128 plus the number of SIGINT, as in shells.
 pub(crate) const INTERRUPTED: u8 = 130;
 
 /// Advice if the arm may be moving.
@@ -29,7 +29,7 @@ const SAFETY: [&str; 3] = [
 
 #[derive(Debug)]
 pub(crate) enum CommandError {
-    /// The arm did not carry out the request.
+    /// A failure without advice of its own, such as a request that the arm did not carry out.
     Arm(String),
     /// Registers did not take their values.
     NotTaken(NotTaken),
@@ -37,7 +37,7 @@ pub(crate) enum CommandError {
     Problems(Vec<Problem>),
     /// The arm may be moving, because this write failed.
     MayMove(WriteError),
-    /// The arguments are invalid, or an answer from the user is missing.
+    /// The arguments are invalid, an answer from the user is missing, or this program was built without the page.
     Usage(String),
     /// No port was given, and none leads to an arm. `tried` holds each port with the reason.
     NoArm {
@@ -77,7 +77,7 @@ pub(crate) enum CommandError {
         message: String,
         advice: &'static [&'static str],
     },
-    /// No simulator has a control socket for the request.
+    /// The simulator is not found, is not the only one, or does not answer.
     #[cfg(unix)]
     NoSimulator {
         message: String,

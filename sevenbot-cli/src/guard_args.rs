@@ -75,7 +75,7 @@ pub(crate) fn warn_of(breach: &dyn std::fmt::Display) {
     warn(format_args!("{breach}. --table sets the height of the table; --no-guard ends this warning"));
 }
 
-/// The error for a refused position of the tip, with advice.
+/// The error for a refused position of the tip. With advice if the guard refused it.
 pub(crate) fn refused(reason: &TipRefusal) -> CommandError {
     let other = reason.other_tool().map(|Vector { x, y, z }| {
         let reaches = if matches!(reason, TipRefusal::Guarded(_)) { "may go to" } else { "reaches" };
@@ -88,7 +88,7 @@ pub(crate) fn refused(reason: &TipRefusal) -> CommandError {
     }
 }
 
-/// The error for a refused straight line, with advice.
+/// The error for a refused straight line. With advice if the guard refused it.
 pub(crate) fn refused_line(reason: &StraightLineError) -> CommandError {
     let message = format!("{reason}; nothing was moved");
     match reason.fault {

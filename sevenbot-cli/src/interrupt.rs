@@ -1,6 +1,7 @@
-//! Ctrl-C while the arm moves: the first makes the arm hold its position, the second ends the program.
+//! Ctrl-C after [`Interrupt::catch`]: the first requests the end of the command, the second ends the program. A command that
+//! moves the arm then makes it hold its position ([`hold_on_interrupt`]).
 //!
-//! Without a move, or while a question waits for its answer, Ctrl-C ends the program.
+//! Otherwise Ctrl-C ends the program.
 
 use std::sync::Once;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
@@ -14,7 +15,7 @@ use crate::printer::{note, warn};
 
 /// Number of requests to end: Ctrl-C or a signal.
 static REQUESTS: AtomicU32 = AtomicU32::new(0);
-/// May the arm be moving, so that it has to be stopped?
+/// Does the first Ctrl-C only request the end? So from `Interrupt::catch` to `Interrupt::release`.
 static MOVING: AtomicBool = AtomicBool::new(false);
 static HANDLER: Once = Once::new();
 
@@ -23,7 +24,7 @@ static HANDLER: Once = Once::new();
 pub(crate) struct Interrupt(());
 
 impl Interrupt {
-    /// Catches Ctrl-C and the other signals that end a program. If the handler cannot be set, they end the program.
+    /// Catches Ctrl-C, SIGTERM and SIGHUP. If the handler cannot be set, they end the program.
     pub(crate) fn catch() -> Self {
         MOVING.store(true, Ordering::SeqCst);
         HANDLER.call_once(|| {
@@ -36,7 +37,7 @@ impl Interrupt {
         Self(())
     }
 
-    /// The arm does not move: Ctrl-C ends the program again.
+    /// The work has ended: Ctrl-C ends the program again.
     fn release() {
         MOVING.store(false, Ordering::SeqCst);
     }

@@ -1,4 +1,4 @@
-//! A file that always contains whole lines, even after an error such as a full disk.
+//! A file that contains whole lines only, also after an error such as a full disk.
 
 use std::fs::File;
 use std::io::{self, Seek, Write};

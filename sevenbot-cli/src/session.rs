@@ -15,7 +15,7 @@ use crate::printer::{Printer, note, warn};
 
 /// One run of the program.
 pub(crate) struct Session {
-    /// The port from the command line; `None`: the only one that leads to an arm.
+    /// The port from --port or `SEVENBOT_PORT`; `None`: [`Self::port_name`] chooses one.
     pub(crate) port: Option<String>,
     /// Baud rate, timeout, attempts and register map.
     pub(crate) options: ArmOptions,

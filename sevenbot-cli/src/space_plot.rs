@@ -23,7 +23,7 @@ pub(crate) struct WayPoint {
     pub(crate) vacuum: bool,
 }
 
-// All lengths are in pixels.
+// These lengths are in pixels.
 const PANEL: f64 = 340.0;
 const GAP: f64 = 56.0;
 const TOP: f64 = 72.0;

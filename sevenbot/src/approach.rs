@@ -3,7 +3,7 @@
 //! ```text
 //!   Standing: where the arm is ──┐
 //!   first point ─────────────────┼──▶ Approach: a smooth way there ──▶ points at any time
-//!   ApproachRule ────────────────┘    or StartTooFar: the distance of each joint
+//!   ApproachRule ────────────────┘    or StartTooFar: the joints that are too far away
 //! ```
 //!
 //! Arithmetic only, without an arm or a clock. The command line, Python and the page share it.
@@ -44,7 +44,7 @@ pub enum ApproachRule {
 /// Where an arm stands, joint 1 first.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Standing {
-    /// The measured angles in degrees; `None` for a joint that was not measured.
+    /// The measured angles in degrees; `None` for a joint that was not measured. Without the extended block, such a joint has 0.
     pub measured: [Option<f64>; 7],
     /// The targets in degrees.
     pub targets: [f64; 7],
@@ -145,7 +145,7 @@ impl Approach {
         Ok(Self { from, to: *first, duration })
     }
 
-    /// The duration of the way; 0 if the arm is at the point.
+    /// The duration of the way. If the arm is at the point, it is 0, or the time of [`ApproachRule::Within`].
     #[must_use]
     pub const fn duration(&self) -> Duration {
         self.duration

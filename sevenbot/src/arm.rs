@@ -69,7 +69,7 @@ impl Arm {
     /// Opens a port and checks that a 7Bot V2 answers. `path` may be the address of a server: [`Address`](crate::network::Address).
     ///
     /// # Errors
-    /// The port cannot be opened, no device answers, or another device answers.
+    /// The port cannot be opened or failed, no device answers, or another device answers.
     pub fn open(path: &str, baud: u32) -> Result<Self, OpenError> {
         Self::open_with(path, ArmOptions { baud, ..ArmOptions::default() })
     }
@@ -77,7 +77,7 @@ impl Arm {
     /// As [`Arm::open`], with timeout, attempts and register map as the options say.
     ///
     /// # Errors
-    /// The port cannot be opened, no device answers, or another device answers.
+    /// The port cannot be opened or failed, no device answers, or another device answers.
     pub fn open_with(path: &str, options: ArmOptions) -> Result<Self, OpenError> {
         Self::over(open_line(path, options.baud)?, path, options)
     }
@@ -119,8 +119,8 @@ impl Arm {
         self.view.map
     }
 
-    /// Does the arm have this register? Registers that only map 2.1 has are missing in the maker's firmware 2.2, and
-    /// [`OPTIONS`](crate::map21::OPTIONS) is in this project's firmware only.
+    /// Does the arm have this register? Registers that only map 2.1 has are missing in the maker's firmware 2.2.
+    /// [`OPTIONS`](crate::map21::OPTIONS) and registers 128 to 199 are in this project's firmware only.
     #[must_use]
     pub fn serves(&self, address: u8) -> bool {
         self.view.serves(address)
@@ -194,11 +194,12 @@ impl Arm {
     /// [D17](protocol_core::decisions#d17)). The arm does not answer a write. [`Arm::write_checked`] reads the
     /// registers back.
     ///
-    /// Registers that need both maps are written in several frames. A write to a register that only map 2.1 has ends the
-    /// reports of map 2.2 ([M4](protocol_core::decisions#m4)). [`Arm::write_checked`] starts them again.
+    /// Registers that need both maps, or that map 2.1 has elsewhere, are written in several frames. A write to a register that
+    /// only map 2.1 has ends the reports of map 2.2 ([M4](protocol_core::decisions#m4)). [`Arm::write_checked`] starts them
+    /// again.
     ///
     /// # Errors
-    /// The registers reach past 255 (then nothing is sent), or the port failed.
+    /// The registers reach past 255 or one frame does not hold all (then nothing is sent), or the port failed.
     pub fn write(&mut self, address: u8, values: &[u8]) -> Result<(), Error> {
         Span::of_values(address, values).ok_or(Error::OutsideMap { address, count: values.len() })?;
         let frames = self.view.writes(address, values);

@@ -60,7 +60,7 @@ impl Arm {
         self.with_min_attempts(|arm| arm.write_until_taken(writes))
     }
 
-    /// Runs `work` with the EEPROM lock open. Closes the lock afterwards, also after a failure.
+    /// Runs `work` with the EEPROM lock open. Closes the lock afterwards, also after a failure of `work`.
     ///
     /// A restart of the controller meanwhile closes the lock. Then the error names the restart as the cause, not the lock:
     ///

@@ -104,7 +104,7 @@ impl Arm {
         Ok(())
     }
 
-    /// Has the program that streams ended its stream? Then it has changed the watchdog since `before`.
+    /// Has the program that streams ended its stream? Then it has changed the watchdog since `before`, unless its stream had none.
     fn is_stream_over(&mut self, before: &Snapshot) -> Result<bool, WriteError> {
         let watchdog = |registers: &Snapshot| registers.byte(&HOST_WATCHDOG);
         Ok(watchdog(&self.read_span(PERIOD_AND_WATCHDOG)?) != watchdog(before))

@@ -41,7 +41,7 @@ impl FineAngle {
         if hundredths <= Self::MAX_HUNDREDTHS { Some(Self(hundredths)) } else { None }
     }
 
-    /// The nearest hundredth. `None` outside 0 to 180 degrees, and for NaN.
+    /// The nearest hundredth. `None` if that is outside 0 to 180 degrees, and for NaN.
     #[must_use]
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 18000")]
     pub fn from_degrees(degrees: f64) -> Option<Self> {

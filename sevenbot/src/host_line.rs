@@ -8,7 +8,7 @@ use crate::error::PortError;
 
 /// A line to an arm, such as a serial port. A line to an arm in virtual time has a clock of its own.
 ///
-/// All waits of the library use this clock, so that an [`Arm`](crate::Arm) in virtual time waits in virtual time.
+/// All waits for an open arm use this clock, so that an [`Arm`](crate::Arm) in virtual time waits in virtual time.
 pub trait HostLine: fmt::Debug + Send {
     /// Sends bytes.
     ///

@@ -35,7 +35,7 @@ pub struct Identity(Snapshot);
 pub enum Firmware {
     /// This project's, 3.0 or later: all functions work.
     Ours,
-    /// The maker's, 1.0 to 2.4. It has no status block, checks no ranges and reports no refusal.
+    /// The maker's, 1.0 to 2.4. It has no status block and checks no ranges. It reports no refusal, except by alarms in map 2.1.
     Makers,
     /// Any other version.
     Unknown,

@@ -5,11 +5,12 @@
 //!                                                                              └──▶ targets that hold the arm
 //! ```
 //!
-//! Position 0 is either 0 degrees or, in the first half second after power-up, a joint that is not measured yet. Only
-//! the extended block tells the two apart. On other arms, a joint is measured if one of these holds:
+//! Position 0 is either 0 degrees or a joint that was never measured: in the first half second after power-up, or because its
+//! servo is silent. Only the extended block tells the two apart. On other arms, start-up is over for a joint if one of these
+//! holds. Then the joint is measured or its servo is silent:
 //!
 //! - Register 242 lists a missing servo, because the arm lists one only after start-up.
-//! - The joint is at rest with target 0, which is not the default of any joint.
+//! - The joint is at rest with target 0, which is not the default of any joint in this project's firmware.
 //! - 700 ms have passed since the first read.
 
 use std::time::Duration;
@@ -159,7 +160,7 @@ impl JointSnapshot {
         self.registers.joints(&PRESENT_POSITION)
     }
 
-    /// The joints whose servo does not answer, as [`Joint::bit`]s.
+    /// The joints whose servo does not answer, as [`Joint::bit`]s; 0 without a status block.
     #[must_use]
     pub fn missing(&self) -> u8 {
         self.status.as_ref().map_or(0, StatusBlock::missing)

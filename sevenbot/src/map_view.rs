@@ -121,7 +121,8 @@ impl MapView {
         self.map == Map::V22 && of_map21.peek().is_some() && !of_map21.any(starts_others)
     }
 
-    /// The map for registers that both maps have. It is the map of the other registers in the write, so that one frame holds all.
+    /// The map for registers that both maps have. If the write also has registers of map 2.1 only, and none of map 2.2 only, it
+    /// is map 2.1, so that one frame holds all.
     fn default_map(self, address: u8, count: usize) -> Map {
         let has = |test: &dyn Fn(u8) -> bool| (address..=u8::MAX).take(count).any(test);
         let is_only_map22 = |address| FEEDBACK_FREQUENCY.holds(address) || PRESENT_POSITION.holds(address);
@@ -131,7 +132,7 @@ impl MapView {
         }
     }
 
-    /// Does only the function of map 2.1 write this register?
+    /// Is this register always written with the function of map 2.1?
     fn writes_by_map21(self, address: u8) -> bool {
         self.map == Map::V21 || self.firmware == Firmware::Ours && is_only_map21(address)
     }
@@ -142,7 +143,7 @@ impl MapView {
         self.map == Map::V21 && (PRESENT_POSITION.holds(address) || self.starts_inverse(address))
     }
 
-    /// The ranges of registers that a report may hold.
+    /// The ranges of registers in reports of positions. The reports of loads in map 2.1 are not among them.
     pub(crate) const fn reports(self) -> &'static [Span] {
         match self.map {
             // One range for each value of register 189 (D26), from 0 on.

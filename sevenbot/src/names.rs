@@ -16,7 +16,8 @@ use host_link::Span;
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum NameError {
-    /// No register name starts with the text, and it is not a number.
+    /// The text is not a number, and no register name starts with it. Rows of map 2.1 do not count if map 2.2 uses
+    /// all their addresses.
     #[error("there is no register of this name: `sevenbot registers` lists the names")]
     Unknown,
     /// Several register names start with the text.
@@ -25,10 +26,10 @@ pub enum NameError {
     /// The text after the dot is not a joint, 1 to 7.
     #[error("a joint is a number from 1 to 7")]
     NoJoint,
-    /// The row does not have one register per joint.
+    /// The row does not have a value for each joint.
     #[error("{} has no joints", name_of(.0))]
     NotPerJoint(&'static Register),
-    /// The number is not an address, 0 to 255.
+    /// The number is not an address, 0 to 255, or an end of the range is missing.
     #[error("a register's number is 0 to 255")]
     NoAddress,
     /// The range ends before it starts.
@@ -109,8 +110,8 @@ fn shown(row: &Register) -> Span {
     addresses().next().and_then(|first| Span::new(first, count)).unwrap_or(Span::NONE)
 }
 
-/// The row of this name. A whole name counts in both maps. A shortened one is searched in map 2.1 only if no name of map
-/// 2.2 begins with it.
+/// The row of this name. A whole name counts in both maps, unless map 2.2 uses all addresses of a row of map 2.1. A shortened one
+/// is searched in map 2.1 only if no name of map 2.2 begins with it.
 fn row(name: &str) -> Result<&'static Register, NameError> {
     let wanted = name.to_ascii_uppercase().replace('-', "_");
     let rows =

@@ -21,7 +21,7 @@ const UNLOCK_TIMEOUT: Duration = Duration::from_secs(1);
 /// Time between two attempts to open a locked port.
 const TRY_AGAIN: Duration = Duration::from_millis(20);
 
-/// An open serial port, which no other program can open meanwhile.
+/// An open serial port, which no other program can open meanwhile, unless it runs as root.
 pub struct OpenPort {
     port: Box<dyn SerialPort>,
 }
@@ -33,7 +33,7 @@ impl fmt::Debug for OpenPort {
 }
 
 impl OpenPort {
-    /// Opens a port and locks it: no other program can open it.
+    /// Opens a port and locks it against other programs.
     ///
     /// # Errors
     /// The port cannot be opened.
@@ -47,7 +47,7 @@ impl OpenPort {
         }
     }
 
-    /// Changes the baud rate; `false` if the port does not support it.
+    /// Changes the baud rate; `false` if the port does not support it, or failed.
     pub(crate) fn set_baud(&mut self, baud: u32) -> bool {
         self.port.set_baud_rate(baud).is_ok()
     }

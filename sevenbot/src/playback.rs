@@ -87,7 +87,8 @@ pub fn steps(recording: &Recording, factor: f64) -> Vec<Step> {
     steps
 }
 
-/// One step that moves an arm slowly to a pose. All joints arrive together.
+/// One step that moves an arm slowly to a pose. The joints arrive at about the same time; those with a short way arrive earlier,
+/// because each speed is rounded up to a step.
 #[must_use]
 pub fn approach(from: [Angle; 7], to: Moment) -> Step {
     let to = WholeMoment::from(to);
@@ -189,7 +190,8 @@ impl Waypoints<'_> {
         let degrees = self.degrees(index, joint);
         let until = match degrees {
             0.0 => return None,
-            // A slow movement has single degrees with rests between them. Each degree fills the time to the next one.
+            // A slow movement has single degrees with rests between them. Each degree fills the time to the next one, up to
+            // 250 ms.
             1.0 => self.next_move(index, joint).min(self.time(index) + MAX_DEGREE_DURATION),
             _ => self.time(index + 1),
         };

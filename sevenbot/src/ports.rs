@@ -20,7 +20,7 @@ const PROBE_TIMEOUT: Duration = Duration::from_millis(200);
 /// More than one attempt, because a port may first deliver garbage after it was opened.
 const PROBE_ATTEMPTS: u32 = 2;
 
-/// A serial port of this machine.
+/// A serial port of this machine, or a server of this user.
 ///
 /// ```no_run
 /// for port in sevenbot::ports::available() {
@@ -31,7 +31,7 @@ const PROBE_ATTEMPTS: u32 = 2;
 pub struct PortInfo {
     /// The name to open it by.
     pub name: String,
-    /// The system's description of the device; may be empty.
+    /// The system's description of the device, which may be empty; of a server, the serial port of its arm.
     pub description: String,
 }
 
@@ -137,7 +137,7 @@ fn open_quickly(name: &str, baud: u32) -> Result<Arm, OpenError> {
 /// Calls `on_rate` with each rate before trying it.
 ///
 /// # Errors
-/// The arm answers at no rate: the error of the last rate. Or the port cannot be opened.
+/// The arm answers at no rate: the error of the last rate. Or the port cannot be opened, or another device answers.
 pub fn find_baud(name: &str, mut on_rate: impl FnMut(u32)) -> Result<Arm, OpenError> {
     let mut last = OpenError::NotFound;
     for baud in BAUD_RATES {

@@ -33,7 +33,7 @@ pub enum ValueError {
         /// The number that was given, in the table's unit.
         value: i32,
     },
-    /// The number is not a byte, and the table has no range for the register.
+    /// The number is not a byte. Only for raw bytes, and where the table has no register.
     #[error("{0} is not a byte, 0 to 255")]
     NotAByte(i32),
 }

@@ -7,8 +7,8 @@
 //!   LatestPoints: what a program that does not wait sends then ────────┘
 //! ```
 //!
-//! If the program dies, the watchdog of the arm acts: [`WatchdogAction`]. A clean end, an error and a panic put the registers
-//! back. After a lost connection, a player leaves them to the watchdog.
+//! If the program dies, the watchdog of the arm acts, unless it is off: [`WatchdogAction`]. A clean end, an error and a panic put
+//! the registers back. After a lost connection, a player leaves them to the watchdog.
 
 use std::time::Duration;
 
@@ -136,7 +136,8 @@ impl From<WriteError> for StreamError {
     }
 }
 
-/// An open stream. While it lives, the arm takes fine targets as points of a stream, and its watchdog runs.
+/// An open stream. While it lives, the arm takes fine targets as points of a stream, and its watchdog runs if the options
+/// set one.
 ///
 /// ```no_run
 /// use sevenbot::stream::{SetPointStream, StreamOptions, StreamPace};
@@ -170,10 +171,10 @@ pub struct SetPointStream<'a> {
 }
 
 impl<'a> SetPointStream<'a> {
-    /// Sets period and watchdog. The joints stay where they are.
+    /// Sets period and watchdog. No joint begins to move.
     ///
     /// # Errors
-    /// The arm has no extended block, or does not take the values.
+    /// The arm has no extended block, does not take the values, or an exchange failed.
     pub fn open(arm: &'a mut Arm, options: StreamOptions) -> Result<Self, StreamError> {
         if !arm.has_extended_block()? {
             return Err(StreamError::NoExtendedBlock);
@@ -205,8 +206,8 @@ impl<'a> SetPointStream<'a> {
     /// its cause. Call it at least ten times a second.
     ///
     /// # Errors
-    /// A joint of the stream is blocked, let go or silent, the supply was lost, the controller restarted, the motors are off,
-    /// another program stopped the arm, or the arm does not answer any more.
+    /// A joint of the stream is blocked, let go or silent, a servo has a new alarm, the supply was lost, the controller restarted,
+    /// the motors are off, another program stopped the arm, or the arm does not answer any more.
     pub fn check(&mut self) -> Result<(), MoveCheckError> {
         self.check.poll(self.arm)
     }
@@ -236,7 +237,7 @@ impl<'a> SetPointStream<'a> {
         Ok(())
     }
 
-    /// The joints that got a point, as [`Joint::bit`](crate::Joint::bit)s.
+    /// The joints that got a point since [`Self::open`] or [`Self::begin_again`], as [`Joint::bit`](crate::Joint::bit)s.
     #[must_use]
     pub const fn joints(&self) -> u8 {
         self.check.joints()

@@ -5,8 +5,8 @@
 //!      ╰ noise ╯╰ read 54..60  ─╯ ╰ answer ────────────────╯
 //! ```
 //!
-//! A read and its answer start with the same bytes. Both directions are tried; only one has a valid checksum. A read of 0
-//! registers has the same bytes as its answer, and counts as a read.
+//! A read and its answer start with the same bytes. Both directions are tried; as a rule only one has a valid checksum. If both
+//! have one, as a read of 0 registers and its answer, the bytes count as a read.
 
 use host_link::{HostEvent, Snapshot};
 use protocol_core::registers::Map;

@@ -2,8 +2,8 @@
 //!
 //! ```text
 //!   7bot-log 1 program=3.0.0 port=/dev/ttyUSB0 baud=115200 unix-time=1795474513
-//!   12043 > aa770100...        microseconds since the start: the program sent these bytes
-//!   14377 < aa770103...        the arm sent these
+//!   12043 > aa77030008...      microseconds since the start: the program sent these bytes
+//!   14377 < aa77030008...      the arm sent these
 //! ```
 //!
 //! The lines after the first have the format of a recorded session ([`arm_sim::session`]). [`entries`] reads both kinds of

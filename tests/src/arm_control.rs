@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 /// A capability that not every arm under test has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Need {
-    /// It was just switched on, is in the standard pose, and has received nothing.
+    /// It was just switched on, is in the standard pose, and has received no write.
     FreshArm,
     /// Its chip id can be chosen.
     ChosenChipId,
@@ -17,7 +17,7 @@ pub enum Need {
     Persistence,
     /// Its servos can be made to fail.
     ServoFaults,
-    /// It does not fall without torque.
+    /// A stand can support it, so that it does not fall without torque.
     Support,
     /// Its settings storage may be filled.
     ExpendableStorage,

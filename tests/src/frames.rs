@@ -40,7 +40,7 @@ pub fn reply(address: u8, values: &[u8]) -> Vec<u8> {
     with_checksum(&frame)
 }
 
-/// Does the frame write a target?
+/// Does the frame write a target of map 2.2?
 #[must_use]
 pub fn is_target(frame: &[u8]) -> bool {
     let &[_, _, 0x06, address, count, ..] = frame else { return false };

@@ -1,4 +1,4 @@
-//! Checks whether this computer delivers multicast datagrams from one of its programs to another.
+//! Checks whether this computer delivers multicast datagrams from one of its sockets to another.
 
 use std::net::{Ipv4Addr, UdpSocket};
 use std::time::Duration;

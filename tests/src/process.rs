@@ -16,7 +16,7 @@ use crate::wait::{TIMEOUT, wait_for};
 /// A program that is killed when it is dropped, so that it does not outlive a test that fails.
 #[derive(Debug)]
 pub struct RunningProgram {
-    /// `None` after its end.
+    /// `None` once [`Self::output`] has taken it.
     child: Option<Child>,
     /// True if the program starts processes of its own, and ends them when it is terminated.
     has_processes: bool,

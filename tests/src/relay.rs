@@ -24,7 +24,7 @@ use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 use crate::frames::{FrameSplitter, is_target};
 use crate::wait::wait_for;
 
-/// The longest time until the relay notices that it has to end, in nanoseconds.
+/// The longest wait for bytes, in nanoseconds. After it the relay checks whether it has to end.
 const POLL_NANOS: i64 = 20_000_000;
 
 /// The time of the action: directly before the relay passes this frame on. N counts from 1.
@@ -70,7 +70,7 @@ pub struct RelayPlan {
     pub is_noisy: bool,
 }
 
-/// A port for a program. It exists until this value is dropped.
+/// A port for a program. It exists until this value is dropped, or the action unplugs the line.
 pub struct Relay {
     path: PathBuf,
     /// Keeps the raw mode while no program has the port open.

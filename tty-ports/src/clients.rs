@@ -91,7 +91,7 @@ impl Clients {
         Ok(ClientWatch(watch))
     }
 
-    /// Number of clients that have a port open.
+    /// Number of clients that have a port open. After lost reports, 1 stands for any number.
     #[must_use]
     pub fn count(&self, port: ClientWatch) -> usize {
         self.ports.get(&port.0).map_or(0, |port| port.count)

@@ -1,7 +1,7 @@
 //! A serial port, most often of a USB adapter.
 //!
-//! The port is opened for this process only, in raw mode, at any baud rate. If the adapter has a latency timer, the program
-//! tries to set it to its minimum.
+//! The port is opened for this process only, in raw mode, at any baud rate that the adapter supports. If the adapter has a
+//! latency timer, the program tries to set it to its minimum.
 
 use std::fs;
 use std::io;

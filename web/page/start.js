@@ -38,6 +38,6 @@ function afterFirstPicture() {
 }
 
 sevenbot.start();
-// For tests and the console of the browser: state(), project(x, y, z), frame_count().
+// For tests and the console of the browser: state(), project(x, y, z), frame_count(), memory_size().
 window.sevenbot = sevenbot;
 afterFirstPicture();

@@ -39,7 +39,7 @@ pub struct ArmState {
     pub moving: u8,
     /// The stalled joints, bit n-1 for joint n: the joints that the arm reports as blocked or let go, and those of joints 1 to 6
     /// that rest away from their target. Joint 7 may rest away from its target because it holds something. 0 if the motors are
-    /// off, or from an arm that lacks the extended or the status block.
+    /// off or damped, or from an arm that lacks the extended or the status block.
     pub stalled: u8,
     /// The problems that need attention, the most important first.
     pub problems: Vec<Problem>,

@@ -93,14 +93,14 @@ impl Client {
         self.rounds
     }
 
-    /// True if all registers were read by requests that were queued after this write, so that they show its effect. `write` is
-    /// the time that [`Self::write`] returned.
+    /// True if a complete round of reads was queued after this write, so that the registers show its effect. `write` is the time
+    /// that [`Self::write`] returned.
     #[must_use]
     pub fn was_read_since(&self, write: Instant) -> bool {
         self.rounds > 0 && self.read_since > write
     }
 
-    /// The last known value of each register, 0 to 255.
+    /// The last known value of each register, 0 to 255; 0 for a register that no round reads.
     #[must_use]
     pub const fn registers(&self) -> &Snapshot {
         &self.registers

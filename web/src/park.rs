@@ -5,9 +5,9 @@
 //!             └── motors off, a problem, a stop or a pause: ParkFailure ─────┘
 //! ```
 //!
-//! The path, its speed and the time to check are the same as for `sevenbot park`. A failure on the way stops the arm, unless
-//! another client has stopped it already. After a failure in the last stage, `holds_again` decides whether the motors drive the
-//! arm again.
+//! The path, its speed and the time to check are the same as for `sevenbot park` with the standard pose. A failure on the way
+//! stops the arm, unless another client has stopped it already. After a failure in the last stage, `holds_again` decides whether
+//! the motors drive the arm again.
 
 use protocol_core::time::{Duration, Instant};
 use sevenbot::fine::FineTargets;

@@ -74,7 +74,7 @@ impl Tab {
         Joint::ALL.map(|joint| f64::from(self.arm.simulation().plant().angle(joint)) / 1e3)
     }
 
-    /// The registers that a program or park has to restore: speeds and times.
+    /// The registers that have to be the same after a program or park: speeds and times.
     pub(crate) fn registers(&self) -> Vec<u8> {
         [SPEED, TIME].iter().flat_map(|row| self.client.registers().joints(row)).collect()
     }

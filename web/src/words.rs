@@ -115,7 +115,7 @@ fn moving_or_ready(
 }
 
 /// The name of the text that confirms a stop of an arm that has problems. `None` if there was no stop, if the arm moves again, or
-/// if a joint may lack the torque to hold.
+/// if a joint of a driven arm may lack the torque to hold.
 fn stop_confirmation(state: &ArmState, stop: StopProgress) -> Option<&'static str> {
     let is_without_torque = state.problems.iter().any(|problem| {
         use ProblemKind::{LetGo, NoAnswer, NoServoAnswers, SupplyLost};

@@ -10,7 +10,7 @@ pub(crate) use emulator::process::{ChildProcess, TaskResult, wait_for};
 /// The target triple of a browser.
 pub(crate) const BROWSER: &str = "wasm32-unknown-unknown";
 
-/// The packages whose programs and tests are built for the host. All commands select the same packages, because another
+/// The packages whose programs and tests are built for the host. Most commands select the same packages, because another
 /// selection may enable other features, and then their dependencies are built again. `cargo xtask` has built xtask before.
 pub(crate) const TESTED: &str = "--workspace --exclude footprint --exclude xtask";
 /// The packages that are linted and documented for the host.

@@ -51,8 +51,8 @@ impl Plant {
         servo.set_wall(obstacle);
     }
 
-    /// Puts a thing between the claws, or removes it. Joint 7 cannot close beyond the thing's angle. Set the weight of the thing
-    /// with [`Plant::set_load`].
+    /// Puts a thing between the claws, or removes it. Joint 7 cannot close beyond the angle of a thing that does not give way.
+    /// Set the weight of the thing with [`Plant::set_load`].
     pub fn set_thing(&mut self, thing: Option<Thing>) {
         (self.is_thing_gripped, self.room_stop) = (false, None);
         let obstacle = thing.map(|Thing { millidegrees, stiffness }| {

@@ -44,7 +44,7 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
     }
 
     /// Restarts only the controller at `now`, as its watchdog does. RAM and the bytes on the host line are lost. The
-    /// servos keep power, torque and goals.
+    /// servos keep power, torque and goals. Has no effect while the arm is off.
     pub fn restart_controller(&mut self, now: Instant) {
         self.record_action(now, Action::RestartController);
         self.simulate(now, false);

@@ -21,7 +21,7 @@ const VERSION: u8 = 21;
 /// The maker's firmware starts with a speed of 600 and a time of 1000 ms, and keeps their low bytes.
 const SPEED_AT_START: u8 = 88;
 const TIME_AT_START: u8 = 232;
-/// The first register that is stored in an [`Image`].
+/// The first register of an [`Image`].
 const IMAGE_START: u8 = CHIP_ID.address + CHIP_ID.count;
 
 #[derive(Clone, Debug)]

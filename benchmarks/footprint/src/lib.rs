@@ -1,9 +1,9 @@
 //! Shared parts of the measuring programs: inputs that the compiler cannot evaluate, and a panic handler that must not be
 //! linked.
 //!
-//! Each program calls a part of the cores, or a peer of `cargo xtask bench`. Inputs and outputs pass through [`opaque`], so the
-//! compiler can neither evaluate nor remove the calls. `xtask` inspects the linked images, and runs those that [count](meter)
-//! in the emulator.
+//! The programs call parts of the cores, kinematics, or peers of `cargo xtask bench`. Inputs and outputs pass through
+//! [`opaque`], so the compiler can neither evaluate nor remove the calls. `xtask` inspects the linked images, and runs those
+//! that [count](meter) in the emulator.
 
 #![no_std]
 

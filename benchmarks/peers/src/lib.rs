@@ -23,7 +23,7 @@ pub trait Server {
     fn feed(&mut self, piece: &[u8], reply: &mut impl FnMut(&[u8]));
 
     /// Ends the stream like a silence longer than any timeout: drops an unfinished frame, and answers complete requests behind its
-    /// header.
+    /// header. [`PostcardServer`] does nothing, because a mark ends its frames.
     fn end(&mut self, reply: &mut impl FnMut(&[u8]));
 
     /// The number of requests executed so far.

@@ -225,7 +225,8 @@ impl Classroom {
         self.pupils.retain(is_kept);
     }
 
-    /// Takes the state of the real arm. A state that equals the last one changes nothing.
+    /// Takes the state of the real arm. A state that equals the known one changes nothing; [`Self::take_hold`] also changes the
+    /// known one.
     pub fn arm_news(&mut self, now: Instant, news: ArmNews) {
         let Some(arm) = &mut self.arm else { return };
         let (is_new, confirms_stop) = arm.take_news(news);

@@ -10,7 +10,7 @@ use crate::wait::wait_for;
 const REFERENCE: u8 = 17;
 /// Start-up time: the reference needs 10 microseconds, the converter 3 (DS8626).
 const START_UP_MICROS: u32 = 20;
-/// Limit on the polls for the end of the conversion, which takes 24 microseconds.
+/// Limit on the polls for the end of the conversion, which takes 24 microseconds with the PLL, 123 without it.
 const DONE_POLLS: u32 = 10_000;
 
 /// The factory's reading of the internal reference at 3.3 V (DS8626); `None` in the emulator.
@@ -25,7 +25,7 @@ pub fn read_reference(rcc: &pac::RCC, adc: &pac::ADC1, common: &pac::ADC_COMMON)
     rcc.apb2enr().modify(|_, w| w.adc1en().enabled());
     let _ = rcc.apb2enr().read();
     common.ccr().modify(|_, w| w.adcpre().div4().tsvrefe().enabled());
-    // 480 cycles at 21 MHz are 23 microseconds; the reference needs at least 10.
+    // 480 cycles at 21 MHz, the highest clock here, are 23 microseconds; the reference needs at least 10.
     adc.smpr1().modify(|_, w| w.smp17().cycles480());
     // SAFETY: channel 17 exists; the channels are 0 to 18.
     adc.sqr3().write(|w| unsafe { w.sq1().bits(REFERENCE) });

@@ -18,7 +18,7 @@ use crate::clock_rates::ClockSource;
 use crate::crystal;
 
 /// The crystals that may be fitted, in MHz, in rising order. The firmware measures which one it is. The measurement is
-/// exact to some 4 %, so it cannot tell 24 or 26 MHz from 25: a board with one of these two lists only that one.
+/// exact to some 4 %, so it cannot tell 24 or 26 MHz from 25: a board with one of these two lists it instead of 25.
 pub const CRYSTALS_MHZ: &[u8] = &[8, 12, 16, 25];
 
 const _: () = assert!(crystal::are_distinct(CRYSTALS_MHZ));
@@ -82,7 +82,8 @@ pub const HOST_PRIORITY: u8 = 2 << 4;
 /// table 36), so the shortest period is 1.36 s. The erase of a sector takes up to 0.8 s, and the watchdog is fed before
 /// each.
 pub const WATCHDOG_TURNS: u16 = 1_000;
-/// A save waits until both lines are quiet for this long, in microseconds: longer than a servo waits before it answers.
+/// A save waits until no byte was received, and none sent to the servos, for this long, in microseconds: longer than a servo waits
+/// before it answers.
 pub const SAVE_QUIET_MICROS: u32 = 1_000;
 /// Longest wait before a save, in microseconds: half a control cycle.
 pub const SAVE_TIMEOUT_MICROS: u32 = 5_000;

@@ -80,7 +80,7 @@ fn select(rcc: &pac::RCC, flash: &pac::FLASH, crystal_mhz: Option<u8>) -> ClockS
 }
 
 /// Measures the crystal with TIM11, in kHz. The internal oscillator clocks the core and the timer meanwhile (RM0090, section
-/// 7.2.11). `None` if a capture does not come in time, or if one was missed.
+/// 7.2.11). `None` if a capture does not come in time, if one was missed, or if the count stands still.
 fn measure_crystal(rcc: &pac::RCC, timer: &pac::TIM11) -> Option<u32> {
     // SAFETY: 31 is the largest of the dividers 2 to 31 (RM0090, RCC_CFGR).
     rcc.cfgr().modify(|_, w| unsafe { w.rtcpre().bits(crystal::DIVIDER) });

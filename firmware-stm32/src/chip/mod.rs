@@ -1,7 +1,7 @@
 //! The drivers of the chip: registers, interrupts, and the handlers of crashes. `board.rs` is the table of the pins.
 //!
-//! Firmware and self-test image link the same drivers. The drivers are tested in the emulator. Logic that has a file of its
-//! own outside this folder is tested on the host.
+//! Firmware and self-test image link the same drivers, but only the self-test reads the ADC, and only the firmware writes the
+//! flash. The drivers are tested in the emulator. The other files of the library are logic, tested on the host.
 
 pub mod adc;
 pub mod board;

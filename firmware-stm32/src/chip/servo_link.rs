@@ -13,7 +13,7 @@ use super::uart::{Setup, SharedUart, UartPort};
 use crate::clock_rates::{self, ClockRates};
 use crate::serial_line::BusDirection;
 
-/// Room for the echo of the longest frame and the answer to it.
+/// Room for the echo of the longest frame and the longest answer.
 const RECEIVE: usize = 128;
 /// Room for the longest frame.
 const TRANSMIT: usize = 128;

@@ -11,7 +11,7 @@
 //! interrupt, because in QEMU 7.2 an empty transmitter does not raise it.
 //!
 //! If the receive queue is full, the byte stays in the USART and the interrupt stays masked until the loop reads the
-//! queue. In the emulator the sender then waits. On a wire, an overrun occurs when the next byte is complete. Overruns
+//! queue or waits. In the emulator the sender then waits. On a wire, an overrun occurs when the next byte is complete. Overruns
 //! and all other receive errors are counted.
 //!
 //! Both sides access the line in critical sections. A byte of the servo bus has to be read within 10 microseconds. So the loop

@@ -6,7 +6,7 @@
 //!   client ──▶ {"do":"state"}
 //!          ◀── {"ok":{"time_us":8250000,"joints":[...],"faults":[...],...}}
 //!   client ──▶ {"do":"stat"}
-//!          ◀── {"error":"unknown variant `stat`, ...","hint":"docs/simulation.md lists the requests"}
+//!          ◀── {"error":"unknown variant `stat`, ...","hint":"a request is one JSON object in a line, ..."}
 //! ```
 //!
 //! A request is one line with a JSON object, and so is its answer. Answers have the order of the requests.

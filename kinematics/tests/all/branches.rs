@@ -64,8 +64,8 @@ fn a_hand_bent_to_the_side_has_joint_5_below_90() {
     }
 }
 
-/// All poses in whole degrees in which joint 2, joint 3 or the linkage is at an end, and each other joint is at 0, 90 or 180
-/// degrees.
+/// All legal poses in whole degrees in which joint 2, joint 3 or the linkage is at an end, and joints 1, 4, 5 and 6 are at 0, 90
+/// or 180 degrees.
 fn poses_at_limits() -> impl Iterator<Item = [f64; 6]> {
     const ENDS: [f64; 3] = [0.0, 90.0, 180.0];
     let elbows = (0..=180).flat_map(|t2| (0..=180).map(move |t3| (f64::from(t2), f64::from(t3))));

@@ -15,7 +15,7 @@ fn reach() -> Vec<(f64, f64)> {
     poses.map(|pose| forward(pose).arm.wrist).map(|wrist| (wrist.x, wrist.z)).collect()
 }
 
-/// The distance from a point to the nearest of the grid, at all angles of joint 1.
+/// The distance from a point to the nearest of the grid, with joint 1 at each whole degree and in the plane of the point.
 fn distance_to_grid(reach: &[(f64, f64)], point: Vector<f64>) -> f64 {
     let own = point.y.atan2(point.x).to_degrees();
     let headings = (0..=180).map(f64::from).chain([own, own + 180.0]).filter(|t1| (0.0..=180.0).contains(t1));

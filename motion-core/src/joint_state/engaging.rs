@@ -14,7 +14,7 @@ use crate::torque_check::{TorqueCheck, TorqueFound};
 impl JointState {
     /// Checks the goal that the servo shows while the torque of its joint is pending
     /// ([D12](protocol_core::decisions#d12)). Returns how often the goal has to be sent before torque; `None` if the
-    /// joint must not get torque yet. Then the next answer is checked.
+    /// joint must not get torque yet.
     pub(super) fn check_goal(
         &mut self,
         now: Instant,

@@ -43,7 +43,7 @@ pub enum Instruction {
     Ping = 0x01,
     /// Asks for registers; the servo answers with their values.
     Read = 0x02,
-    /// Writes registers; the servo acknowledges.
+    /// Writes registers; the servo acknowledges unless its response level is 0.
     Write = 0x03,
     /// Writes the same registers of several servos simultaneously; no servo answers.
     SyncWrite = 0x83,

@@ -25,7 +25,8 @@
 //! - **A power cut leaves half-programmed cells.** They may read differently at each start. The seal is programmed after
 //!   the other words were verified, so a sealed record was complete. A record is in doubt if it is unsealed, needed a
 //!   correction, or has remains of another record behind it. A start appends such a record again before it erases
-//!   anything and before it returns the settings.
+//!   anything and before it returns the settings. If home has no slot left for that, it holds the record before, too:
+//!   the start erases the spare, if it is not prepared, and moves the record there.
 //! - **Generation and slot give the order**, not a running number. An interrupted record and its replacement would have
 //!   the same number, and the wrong one might become readable later.
 //! - **Only its mark states that a sector is blank.** After an interrupted erase a sector may read as blank. The mark
@@ -33,10 +34,10 @@
 //!   prepared for, so an older mark that survives an interrupted erase is not valid. One word is enough: the sector is
 //!   blank before the first bit of the mark is programmed. An interrupted mark lacks zeros, and an erase adds none.
 //!   Such a mark costs one more erase, and it cannot become valid if that erase is interrupted, too.
-//! - **A valid mark is revoked before its sector is erased.** Otherwise it might survive an interrupted erase. A start
-//!   erases a sector with a valid mark only after many starts in a row were interrupted during the move to the spare, so
+//! - **A log revokes the valid mark of the spare before it erases the spare.** Otherwise the mark might survive an
+//!   interrupted erase. This happens only after many starts in a row were interrupted during the move to the spare, so
 //!   that the spare is half full of remains. The revocation is a word behind home's own mark: it assigns the next
-//!   generation to the spare.
+//!   generation to the spare. Without a record in either sector nothing is revoked, because there is nothing to lose.
 //! - **A start skips one slot**, because a word whose programming was cut at its very beginning may read as blank. If the
 //!   first record of a power cycle is cut like that, the next power cycle uses the same slot. It programs the same first
 //!   word again, because a record begins with the generation of its sector.
@@ -50,6 +51,7 @@
 //! No word is programmed with two different values. A save programs eight words. A start erases two sectors and
 //! programs 18 words at most: a record appended again, a mark, a record moved, a mark. A cell that does not take its
 //! bit costs a second attempt in the next slot. A revocation after a wrong bit in the newest record costs one word more.
+//! If the first sector cannot be erased, the first start tries it twice.
 //! This module does not know registers: an image is 20 bytes.
 
 mod sectors;

@@ -42,7 +42,8 @@ impl Accepted<'_> {
         Some(u16::from_le_bytes([low, high]))
     }
 
-    /// Does the write reach the extended block or an address above it? Only there do registers have two bytes or a minimum.
+    /// Does the write reach the extended block or an address above it? In map 2.2, only there do values have two bytes or a
+    /// minimum.
     #[must_use]
     pub fn is_extended(&self) -> bool {
         usize::from(self.start) + self.values.len() > usize::from(EXTENDED_START)

@@ -181,7 +181,8 @@ impl RegisterFile {
         (start, values.get(usize::from(start - address)..).unwrap_or(&[]))
     }
 
-    /// Applies a checked write. Registers on which a write has no effect keep their values.
+    /// Applies a checked write. Registers on which a write has no effect keep their values, but 13 to 19 show the offsets in
+    /// the encoding of the write's map ([M5](crate::decisions#m5)).
     pub fn apply(&mut self, accepted: &Accepted<'_>) {
         if self.offsets.is_some() {
             self.show_offsets(Map::V22);

@@ -1,7 +1,7 @@
 //! THE TABLE: every register of map 2.2 of the 7Bot V2 (docs/protocol.md).
 //!
-//! Outside tests, only this table and the table of map 2.1 hold the arm's register addresses as numbers. The registers of a
-//! server are in `host-link/src/sharing.rs`.
+//! Outside tests, benchmarks and texts for users, only this table and the table of map 2.1 hold the arm's register addresses
+//! as numbers. The registers of a server are in `host-link/src/sharing.rs`.
 
 use super::range::Range;
 use super::spec::{Register, eeprom, ram, rom, well_formed};
@@ -167,7 +167,7 @@ pub mod servo_alarm {
     /// The motor is too hot. A joint that was let go for it engages only after its servo cooled down by 5 degrees Celsius
     /// ([D28](crate::decisions#d28)).
     pub const OVERHEAT: u8 = 1 << 2;
-    /// The motor was overloaded for too long. The bit stays until torque is switched off and on.
+    /// The motor was overloaded for too long. The bit stays until torque is switched off.
     pub const OVERLOAD: u8 = 1 << 5;
 }
 
@@ -216,7 +216,7 @@ pub mod limit {
     pub const LINKAGE_SUM: (u8, u8) = (84, 226);
     /// The limit of the claw, joint 7.
     pub const CLAW: u8 = 1 << 1;
-    /// The largest angle of joint 7, in degrees: its servo then is at 1023 counts.
+    /// The largest angle of joint 7, in whole degrees: its servo ends at 1023 counts, which are 84.4 degrees.
     pub const CLAW_MAX: u8 = 84;
 }
 

@@ -26,7 +26,7 @@ pub type FrameBuffer = heapless::Vec<u8, MAX_LENGTH>;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
 pub enum Function {
-    /// 03: a read request, or the reply to one.
+    /// 03: a read request, the reply to one, or a report in map 2.2 ([D14](crate::decisions#d14)).
     Read = 0x03,
     /// 04: a write request in map 2.1; it has no reply ([M1](crate::decisions#m1)).
     WriteMap21 = 0x04,
@@ -52,7 +52,7 @@ pub trait Direction {
 #[derive(Clone, Copy, Debug)]
 pub enum ToArm {}
 
-/// From the arm to the host: a read is a reply that carries the values.
+/// From the arm to the host: a read is a reply or a report, which carries the values.
 #[derive(Clone, Copy, Debug)]
 pub enum ToHost {}
 

@@ -3,8 +3,8 @@
     python scripts/collisions.py            # prints the lines for config/7bot_v2.srdf
     python scripts/collisions.py --write    # replaces them there
 
-A pair is left out of the tests if a joint joins the two links, if it collides in every one of many random poses, or in none of them. The
-poses are within the limits of the joints and of the linkage. Needs numpy and python-fcl.
+A pair is left out of the tests if one link is the next above the other that has a shape, if the pair collides in every one of many
+random poses, or in none of them. The poses are within the limits of the joints and of the linkage. Needs numpy and python-fcl.
 """
 
 from __future__ import annotations

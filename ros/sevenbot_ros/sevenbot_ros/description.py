@@ -91,7 +91,7 @@ def _ros2_control(commands: str, states: str) -> Xml.Element:
     control = Xml.Element("ros2_control", name="sevenbot", type="system")
     hardware = Xml.SubElement(control, "hardware")
     Xml.SubElement(hardware, "plugin").text = PLUGIN
-    # With a threshold a controller that rests sends nothing, and the watchdog of the arm would act.
+    # With a threshold a controller that rests sends nothing, and the stream would end.
     for name, value in (
         ("joint_commands_topic", commands),
         ("joint_states_topic", states),

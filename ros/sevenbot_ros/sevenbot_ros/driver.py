@@ -60,7 +60,7 @@ class Driver:
 
     @property
     def measurement(self) -> Measurement | None:
-        """The last measurement; `None` while no arm answers."""
+        """The last measurement; `None` while no arm answers, and before the first one."""
         monitor = self._monitor
         return None if monitor is None else monitor.last
 

@@ -30,7 +30,7 @@ class Events(Protocol):
         """The joints were measured."""
 
     def diagnosed(self, diagnosis: Health) -> None:
-        """The health was read."""
+        """The health was read, or no arm answers."""
 
     def passed(self, simulated: float) -> None:
         """Simulated time passed: it is `simulated` seconds now."""

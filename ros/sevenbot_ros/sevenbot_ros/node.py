@@ -72,7 +72,7 @@ class ArmNode(Node):
             JointState,
             COMMANDS,
             self._command,
-            # The queue keeps all commands that arrive together after a network pause: each is compared with the one before.
+            # The queue keeps commands that arrive together after a network pause: each is compared with the one before.
             _quality(32, reliable=False),
             callback_group=MutuallyExclusiveCallbackGroup(),
         )

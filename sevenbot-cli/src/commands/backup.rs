@@ -121,7 +121,7 @@ fn changed_registers(changes: &[Change], wanted: &Snapshot) -> Snapshot {
     Snapshot { address: first.address, values }
 }
 
-/// Writes all changes in one frame: after a power cut all are old or all are new (D19).
+/// Writes all changes in one frame: after a power cut this project's firmware has all of them or none (D19).
 fn write(arm: &mut Arm, wanted: &Snapshot) -> Result<(), CommandError> {
     // New offsets move the arm a little, so Ctrl-C has to make it hold.
     let write = |arm: &mut Arm| arm.write_checked(wanted.address, &wanted.values);

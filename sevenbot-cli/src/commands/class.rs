@@ -149,8 +149,8 @@ fn config(
     Ok((config, pages))
 }
 
-/// The addresses at which other computers reach the server: `listen`, or if that is unspecified (0.0.0.0), the IPv4
-/// addresses of this computer without loopback and link-local ones.
+/// The addresses at which pupils reach the server: `listen`, or if that is unspecified (0.0.0.0 or ::), the IPv4 addresses of
+/// this computer without loopback and link-local ones.
 fn hosts(listen: IpAddr) -> Vec<IpAddr> {
     if !listen.is_unspecified() {
         return vec![listen];

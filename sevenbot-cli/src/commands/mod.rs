@@ -1,4 +1,4 @@
-//! The commands, one module each: arguments and execution.
+//! The commands: arguments and execution. Related commands share a module.
 
 pub(crate) mod backup;
 pub(crate) mod baud;

@@ -233,7 +233,7 @@ fn wait_for_rest(arm: &mut Arm, before: &PaceBefore, error: &CommandError, inter
             joints(moving)
         ));
     }
-    // If this wait fails, `put_back` fails for the same reason, and warns.
+    // If this wait fails, other than by Ctrl-C, `put_back` fails for the same reason, and warns.
     let _ = before.wait_for_rest(arm, &mut ProgressWatch::new(interrupt));
 }
 
@@ -310,7 +310,7 @@ impl Printable for Positions {
     }
 }
 
-/// Positions of the joints, in hundredths of a degree.
+/// Positions of the joints, in degrees with two decimals.
 #[derive(Serialize)]
 pub(crate) struct FinePositions {
     pub(crate) positions_degrees: [f64; 7],

@@ -40,7 +40,7 @@ pub(crate) fn run(session: &mut Session) -> Result<(), CommandError> {
     session.printer.print(&TipPosition::of(&MeasuredPose::read(&mut arm, joints.positions())?))
 }
 
-/// Fails if the position of a joint that moves the tip is unknown.
+/// Fails if the position of one of joints 1 to 6 is unknown.
 fn all_known(health: &Health) -> Result<(), CommandError> {
     let moves_tip = |joint: Joint| joint.number() <= 6;
     let hides = |problem: &Problem| problem.kind.hides_positions() && problem.joint.is_none_or(moves_tip);

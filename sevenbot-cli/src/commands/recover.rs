@@ -117,7 +117,7 @@ fn tell(health: &Health) {
     }
 }
 
-/// Steps 2 and 3: asks, then switches the motors on.
+/// Steps 2 and 3, if they are necessary: asks, then switches the motors on.
 fn recover(arm: &mut Arm, before: &Health, yes: bool) -> Result<(), CommandError> {
     put_right(arm)?;
     if before.is_driven() && before.problems().iter().all(|problem| !needs_motors(problem.kind)) {
@@ -188,7 +188,7 @@ fn wait_for_servos(arm: &mut Arm) -> Result<Health, CommandError> {
 }
 
 /// Step 4: the health once the motors have held the arm for [`QUIET_TIME`] without a problem for which [`needs_motors`] is
-/// true, or after [`RECOVERY_TIMEOUT`].
+/// true, or the first one after [`RECOVERY_TIMEOUT`] with such a problem or without motors.
 fn wait_until_well(arm: &mut Arm) -> Result<Health, CommandError> {
     let start = arm.now();
     let mut well_since = start;

@@ -1,4 +1,4 @@
-//! `set`: writes registers in one frame, reads them back, and reports those that differ.
+//! `set`: writes registers in one frame, reads them back, and reports those that differ. Motor state 1 is as in `state`.
 
 use clap::Args;
 use sevenbot::map::{BAUD_RATE, FINE_TARGET, MOTOR_STATE, SPEED, TARGET_POSITION, motor_state};

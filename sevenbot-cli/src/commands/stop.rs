@@ -79,7 +79,7 @@ type Outcome = (Result<JointSnapshot, CommandError>, String);
 fn stop_all(session: &mut Session) -> Result<(), CommandError> {
     let served: Vec<_> = network::servers().iter().map(network::LocalServer::address).collect();
     let simulators = running_simulators();
-    // Any other port may lead to another device, so a failure to open it is only a warning.
+    // Any other port may lead to another device: a failure to open it is only a warning, unless no arm was stopped.
     let is_arm = |port: &String| served.iter().chain(&simulators).chain(&session.port).any(|arm| arm == port);
     let mut failed: Option<CommandError> = None;
     let (mut has_stopped, mut tried) = (false, Vec::new());

@@ -14,9 +14,9 @@ use super::request::WholeRequest;
 /// The result of handing over a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Admission {
-    /// The request waits for its turn.
+    /// The request waits for its turn, or the hub holds the arm in its place.
     Queued,
-    /// The request is dropped: too many requests of the client wait already.
+    /// The request is dropped: too many requests of the client wait already, or the client has left.
     NoRoom,
     /// No arm answers: the request is dropped. A read of the server's own registers still gets a reply, and a stop is still
     /// sent to an arm that fell silent.
@@ -69,8 +69,8 @@ impl Hub {
         Admission::Queued
     }
 
-    /// Stops the arm for a client, as 1 in register 239 does. [`Hub::hold_outcome`] has the outcome. Does nothing without an
-    /// arm, or if the server is read-only.
+    /// Stops the arm for a client, as 1 in register 239 does, also an arm that fell silent. [`Hub::hold_outcome`] has the
+    /// outcome. Does nothing if no arm was found since the port was opened, or if the server is read-only.
     pub fn stop_arm(&mut self, now: Instant, id: ClientId) -> Admission {
         if !self.has_arm() && !self.is_silent() {
             return Admission::NoArm;
@@ -148,7 +148,7 @@ impl Hub {
     }
 
     /// Checks whether the client may send a write with this intent now. If it may, and the write moves or switches
-    /// something, the client drives. Otherwise counts the write as dropped.
+    /// something, the client drives. If it may not, counts the write as dropped.
     fn check_motion(&mut self, now: Instant, id: ClientId, intent: Intent) -> Result<(), Admission> {
         let Some(client) = self.clients.get_mut(&id).filter(|_| intent.is_ended_by_stop()) else {
             return Ok(());

@@ -1,7 +1,7 @@
 //! Finds out whether a 7Bot V2 is behind the port, and whether it still answers.
 //!
 //! ```text
-//!   Absent ── the port opens ──▶ Identifying ── a 7Bot V2 answers ──▶ Present ── no reply for 3 s ─────▶ Silent
+//!   Absent ── the port opens ──▶ Identifying ── a 7Bot V2 answers ──▶ Present ── 3 questions missed ───▶ Silent
 //!     ▲                                                                  ▲                                 │
 //!     └── the port closes, from each state                               └──── a 7Bot V2 answers ──────────┘
 //! ```
@@ -20,7 +20,7 @@ use super::{ArmState, Hub};
 const IDENTIFY_PERIOD: Duration = Duration::from_millis(250);
 
 impl Hub {
-    /// From now on the arm is asked once a second whether it answers, also while no client reads.
+    /// From now on the arm is asked whether it answers after each second without a reply, also while no client reads.
     pub const fn watch_arm(&mut self) {
         self.presence.is_watched = true;
     }
@@ -42,7 +42,8 @@ impl Hub {
         self.chip_id = Some(self.known.chip_id().to_vec());
     }
 
-    /// The arm no longer answers. Drops everything that waits for it, except a hold in progress.
+    /// The arm no longer answers. Drops the requests that wait for it, and ends the reads on their way. A hold in progress goes
+    /// on.
     pub(super) fn lose_arm(&mut self, now: Instant) {
         self.arm = ArmState::Silent(now);
         self.line.end_reads();

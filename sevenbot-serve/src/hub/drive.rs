@@ -1,8 +1,9 @@
 //! Decides which client drives the arm, and which clients may.
 //!
-//! A client drives while it writes targets, until it has written none for a second. A stop ends the streams of the other
-//! clients: their targets are dropped until they start anew. They do so by a pause of a second without a target, by a command,
-//! or by a stop. Positions for IK, and writes that switch the motors on, the effector or the pump, count as targets here.
+//! A client drives while it writes targets: until it has written none for a second or hands over, or until the arm is stopped.
+//! If several may write, the last one drives. A stop ends the streams of the other clients: their targets are dropped until they
+//! start anew. They do so by a pause of a second without a target, by a command, or by a stop. Positions for IK, and writes that
+//! switch the motors on, the effector or the pump, count as targets here.
 
 use protocol_core::time::{Duration, Instant};
 

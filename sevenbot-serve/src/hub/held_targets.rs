@@ -12,7 +12,7 @@ use super::intent::Intent;
 /// away is not braking: the program that held it read its position long before.
 const LONGEST_BRAKING: u16 = 1_500;
 
-/// The targets that hold joints; `None`: the joint does not hold.
+/// The targets that hold joints; `None`: no stop or hold gave the joint a target.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct HeldTargets(Angles);
 

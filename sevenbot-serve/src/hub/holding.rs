@@ -1,5 +1,5 @@
-//! How the hub holds the arm: the brake first, then the steps of [`ArmHold`]. At the end the hub restores the set-point period and
-//! the speeds.
+//! How the hub holds the arm: the brake first, then the steps of [`ArmHold`]. Once the arm has confirmed the hold, the hub
+//! restores the set-point period and the speeds.
 //!
 //! ```text
 //!   read the speeds, write 1, read ──▶ no reply: again, every 100 ms
@@ -57,7 +57,7 @@ impl Hub {
         self.hold.is_some()
     }
 
-    /// The outcome of the last hold of the hub; `None`: it has not ended, or there was none.
+    /// The outcome of the last hold of the hub since the port was opened; `None`: it has not ended, or there was none.
     #[must_use]
     pub const fn hold_outcome(&self) -> Option<HoldOutcome> {
         self.hold_outcome

@@ -1,8 +1,9 @@
 //! The registers of the arm that the hub knows without a read. The EEPROM lock and register 20 decide which writes the arm
 //! refuses, and in which form a client that has written nothing reads the offsets. A hold restores the speeds.
 //!
-//! They are read when the arm is found. After that only the hub writes to the arm. The hub does not know whether the settings
-//! storage is full, nor whether the controller restarted. A restart locks the EEPROM.
+//! They are read when the arm is found, except for the registers behind the speeds: those count as after power-up until the
+//! hub writes them. Once the arm is found, only the hub writes to it. The hub does not know whether the settings storage is
+//! full, nor whether the controller restarted. A restart locks the EEPROM.
 
 use motion_core::reach;
 use protocol_core::registers::map::{

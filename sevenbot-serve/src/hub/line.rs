@@ -1,7 +1,7 @@
 //! The line to the arm: a shell round the host link that knows whose read each reply answers.
 //!
-//! Frames are written at the baud rate, so that no queue grows in the kernel, where a later frame could not pass an earlier
-//! one.
+//! Apart from urgent ones, frames are written at the baud rate. So no queue grows in the kernel, where a later frame could not
+//! pass an earlier one.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -19,8 +19,8 @@ use super::request::{WholeRequest, reply_bytes};
 /// since. So a lost frame delays its client, and the clients that wait for the line, only a little. The read is given up after
 /// 3 s only, because a busy computer may not run the arm's side of the port for a second.
 const CLIENT_PATIENCE: Patience = Patience { attempts: 3, timeout: Duration::from_millis(1_000) };
-/// For reads of a hold. Until a reply comes, the hold itself sends another read every 100 ms, after the brake. The reply to each
-/// read may be up to 1 s late.
+/// For reads of a hold. Until a reply comes, the hold itself sends another read every 100 ms, after the brake unless it restores.
+/// The reply to each read may be up to 1 s late.
 const HOLD_PATIENCE: Patience = Patience { attempts: 10, timeout: Duration::from_millis(100) };
 /// For the other reads of the hub, which the hub itself repeats.
 const OWN_PATIENCE: Patience = Patience { attempts: 1, timeout: Duration::from_millis(1_000) };

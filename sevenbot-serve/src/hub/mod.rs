@@ -10,8 +10,9 @@
 //! * While a read of a client has no reply, the client's later requests wait, so their order is kept. Urgent ones do not wait.
 //! * The report registers belong to each client (`own_registers`). The hub uses no reports of the arm: the sampler reads the
 //!   arm at the highest frequency that any client wants, and all clients share the values.
-//! * Without an arm requests are dropped. A request that waited could move an arm that a person just plugged in. With an arm, a
-//!   request that moves or switches something is dropped after 200 ms in the queue, unless it switches the motors off.
+//! * Without an arm requests are dropped, except reads of the server's own registers, and stops of an arm that fell silent. A
+//!   request that waited could move an arm that a person just plugged in. With an arm, a request that moves or switches
+//!   something is dropped after 200 ms in the queue, unless it switches the motors off.
 //! * A stop goes before everything else, and ends the streams of the other clients (`drive`, `intent`).
 
 mod admission;
@@ -95,7 +96,7 @@ pub struct Hub {
     sampler: Sampler,
     watchdog: ClientWatchdog,
     hold: Option<ArmHold>,
-    /// The outcome of the last hold; `None`: it has not ended, or there was none.
+    /// The outcome of the last hold since the port was opened; `None`: it has not ended, or there was none.
     hold_outcome: Option<HoldOutcome>,
     /// The outcome of a failed hold, until [`Hub::take_failed_hold`] takes it.
     failed_hold: Option<HoldOutcome>,
@@ -149,8 +150,8 @@ impl Hub {
         id
     }
 
-    /// The client has closed its connection. What it wrote before is carried out, for [`LONGEST_WAIT`] at most. Its reads and
-    /// its streams of reports end.
+    /// The client has closed its connection. Its waiting writes are carried out, for [`LONGEST_WAIT`] at most. Its reads, writes
+    /// between reads, and streams of reports end.
     pub fn leave(&mut self, now: Instant, id: ClientId) {
         if let Some(client) = self.clients.get_mut(&id) {
             client.leave(now);

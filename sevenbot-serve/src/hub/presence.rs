@@ -5,7 +5,7 @@
 //!                          3 questions unanswered, each for a second ──▶ silent
 //! ```
 //!
-//! While no read waits and no class watches, the hub asks nothing: the line of an idle server is quiet.
+//! While no read waits and no class watches, the hub does not ask a present arm: the line of an idle server is quiet.
 
 use protocol_core::registers::map::DEVICE_CODE;
 use protocol_core::time::{Duration, Instant};

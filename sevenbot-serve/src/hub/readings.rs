@@ -56,8 +56,8 @@ impl Readings {
 
 impl Reading {
     /// The number of joints whose target in the write is the position of this reading; `None` if a joint has another
-    /// target. A joint may also keep the target that this reading shows. If the reading has the limits (register 188), the
-    /// held positions are kept within them.
+    /// target. A joint may also keep the fine target that this reading shows, within [`DROOP`] of its position. If the reading
+    /// has the limits (register 188), fine positions are kept within them.
     fn held(&self, targets: &Register, positions: &Register, address: u8, values: &[u8]) -> Option<usize> {
         let written = angles_in(targets, address, values);
         let [present, measured] = [targets, positions].map(|row| angles_in(row, self.address, &self.values));

@@ -28,7 +28,7 @@ impl Sampler {
         Self { timers: [Timer::OFF; ReportKind::ALL.len()], share: Share::IDLE, waits: false, baud }
     }
 
-    /// Sets the highest frequencies that these clients want.
+    /// Sets the highest frequencies that these clients want, each up to [`highest_frequency`].
     pub(crate) fn set_frequencies<'a>(
         &mut self,
         now: Instant,

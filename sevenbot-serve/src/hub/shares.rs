@@ -2,7 +2,7 @@
 //!
 //! Each client has a tag: the bytes up to which it has used the line. The request that would end at the lowest tag is next, so
 //! a short one does not wait for long ones that could begin at the same tag. A client that was idle starts at the lowest tag of
-//! those that wait. So it waits for one frame, however many frames the others have queued.
+//! those that wait. So its next request waits for few frames, however many frames the others have queued.
 
 /// The tag of a client, and when it was served last.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -31,14 +31,15 @@ pub(crate) struct Shares {
 }
 
 impl Shares {
-    /// The tag at which a client that was idle starts: the lowest tag of those that wait. The tag of the last request may be
-    /// too high: a client with short requests can be ahead of the others by the length of a long request.
+    /// The least tag of a client that was idle: the lowest tag of those that wait, or if none waits, the highest tag of a request
+    /// that was sent. That one may be too high while others wait: a client with short requests can be ahead of them by the
+    /// length of a long request.
     pub(crate) fn floor(&self, waiting: impl Iterator<Item = Share>) -> u64 {
         waiting.map(|share| share.tag).min().unwrap_or(self.current)
     }
 
     /// The sort key of a request of `bytes` bytes: the request with the smallest key is next. Of requests that would end at the
-    /// same tag, the client that has waited longest is next.
+    /// same tag, that of the client which was served longest ago is next.
     pub(crate) fn order(share: Share, bytes: usize) -> (u64, u64) {
         (share.tag.saturating_add(length(bytes)), share.turn)
     }

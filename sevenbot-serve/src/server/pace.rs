@@ -1,5 +1,6 @@
 //! Limits how fast the bytes of a client are taken. A flood of requests that the hub drops at once would keep the server
-//! busy, and delay a stop of another client. So no client is read much faster than the arm's line could carry.
+//! busy, and delay a stop of another client. So no client is read much faster than at [`TIMES_LINE`] times the rate of the
+//! arm's line.
 
 use host_link::time_on_line;
 use protocol_core::time::{Duration, Instant};

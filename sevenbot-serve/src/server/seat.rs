@@ -11,7 +11,7 @@ use crate::hub::{ClientId, Hub};
 /// How a connection ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum End {
-    /// The client closed it: the requests that it sent before are carried out.
+    /// The client closed it: the writes that it sent before are carried out.
     Clean,
     /// It broke, or the client broke a rule of the server: nothing more is carried out.
     Broken,

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 #[cfg(target_os = "linux")]
 use tty_ports::symlink::SymlinkError;
 
-/// Why the server does not start. Each message says what to do.
+/// Why the server does not start. Each message but that of [`StartError::System`] says what to do.
 #[derive(Debug, thiserror::Error)]
 pub enum StartError {
     /// The link to a pseudo-terminal cannot be created.

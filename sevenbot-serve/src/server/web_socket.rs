@@ -22,7 +22,7 @@ use crate::maker::MakerClient;
 
 /// The longest message of a page, in bytes.
 const LONGEST_FRAMES: usize = 4_096;
-/// The longest message of the maker's programs, as in the maker's firmware.
+/// The longest message of the maker's programs, as in the maker's firmware, and of a class.
 const LONGEST_COMMAND: usize = 2_048;
 /// Time for a client to close its connection after it was told to. Then the server closes it.
 const CLOSE_TIMEOUT: Duration = Duration::from_millis(1_000);

@@ -48,9 +48,9 @@ pub struct StraightLine {
     pub duration: Duration,
     /// The targets over the time of the line, as a recording to play.
     pub recording: Recording,
-    /// The largest distance of the tip from the line, in millimetres. Rounded angles cause it.
+    /// The largest distance of the tip from the line at a target, in millimetres. Rounded angles cause it.
     pub deviation_mm: f64,
-    /// The largest angle of the tool to its exact direction, in degrees. Rounded angles cause it.
+    /// The largest angle of the tool to its exact direction at a target, in degrees. Rounded angles cause it.
     pub tilt_degrees: f64,
     /// The angle to which joint 4 turns before the line starts, without moving tip or tool. `None` if it stays.
     pub first_turn: Option<FineAngle>,

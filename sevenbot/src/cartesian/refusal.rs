@@ -58,7 +58,7 @@ pub struct GuardedTip {
     /// The requested direction of the tool.
     pub tool: Vector,
     /// The nearest point that the guard allows with this direction of the tool, to a tenth of a millimetre. `None` if
-    /// there is none.
+    /// the search finds none.
     pub nearest: Option<Vector>,
     /// A usual direction of the tool with which the guard allows the requested point; `None` if there is none.
     pub other_tool: Option<Vector>,
@@ -95,7 +95,7 @@ pub struct Unreachable {
     /// The requested direction of the tool.
     pub tool: Vector,
     /// The nearest point that the tip reaches with this direction of the tool and that the guard, if any, allows, to a tenth
-    /// of a millimetre. `None` if there is no such point, or if the requested tip is no position.
+    /// of a millimetre. `None` if the search finds none, or if the requested tip is no position.
     pub nearest: Option<Vector>,
     /// A usual direction of the tool with which the tip reaches the requested point; `None` if there is none.
     pub other_tool: Option<Vector>,

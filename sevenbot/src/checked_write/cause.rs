@@ -55,7 +55,7 @@ pub enum MismatchCause {
     OutOfReach,
     /// The settings storage is full until the next restart ([D19](protocol_core::decisions#d19)).
     StorageFull,
-    /// The register holds the value, but its setting is not stored: the settings storage has a fault
+    /// The register holds the value, but its setting may not be stored: the settings storage has a fault or became full
     /// ([D19](protocol_core::decisions#d19)).
     NotStored,
     /// The controller has restarted since the write, so its RAM registers hold their defaults.
@@ -69,7 +69,7 @@ pub enum MismatchCause {
 }
 
 impl MismatchCause {
-    /// Can the same frame succeed when it is sent again?
+    /// Is it worth sending the same frame again at once?
     #[must_use]
     pub const fn is_transient(self) -> bool {
         matches!(self, Self::Damaged | Self::Unknown)

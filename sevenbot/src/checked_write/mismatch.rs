@@ -8,7 +8,7 @@ use super::cause::MismatchCause;
 use crate::error::Error;
 use crate::names::name_of_register;
 
-/// A register that does not hold what was written to it, or will not keep it: [`MismatchCause::NotStored`].
+/// A register that does not hold what was written to it, or may not keep it: [`MismatchCause::NotStored`].
 ///
 /// ```
 /// use sevenbot::checked_write::{MismatchCause, WriteMismatch};
@@ -18,9 +18,9 @@ use crate::names::name_of_register;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct WriteMismatch {
-    /// The address of the register; of a two-byte register, its low byte.
+    /// The address of the register; of a two-byte register that was written whole, its low byte.
     pub address: u8,
-    /// The raw value that was written. For a two-byte register, both bytes as one number.
+    /// The raw value that was written. For a two-byte register that was written whole, both bytes as one number.
     pub wanted: u16,
     /// The raw value that was read back.
     pub found: u16,
@@ -51,7 +51,7 @@ impl NotTaken {
         if differing.is_empty() { Ok(()) } else { Err(Self(differing)) }
     }
 
-    /// The registers, in the order of the writes.
+    /// The registers. Those of one write are in the order of their addresses.
     #[must_use]
     pub fn registers(&self) -> &[WriteMismatch] {
         &self.0

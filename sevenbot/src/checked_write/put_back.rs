@@ -5,7 +5,7 @@ use crate::arm::Arm;
 use crate::error::Error;
 use host_link::Snapshot;
 
-/// Each attempt is a write and a read. On a line that loses 3 % of its bytes, about every second attempt succeeds.
+/// Each attempt is a write and a read. On a line that loses 3 % of its bytes, each of the two succeeds about every second time.
 const ATTEMPTS: u32 = 6;
 
 impl Arm {

@@ -23,7 +23,7 @@ impl Arm {
         NotTaken(lost)
     }
 
-    /// `None` if there is no server, if it passes writes on, or if its registers cannot be read.
+    /// `None` if there is no server, if it passes writes on, if its registers cannot be read, or without a status block.
     fn server_reason(&mut self) -> Option<ServerReason> {
         if !self.identity().has_status_block() {
             return None;

@@ -76,7 +76,7 @@ impl MoveCheck {
     ///
     /// # Errors
     /// [`MoveCheckError::Problems`] if a joint cannot be driven now. A blocked joint can: its next target tries again.
-    /// [`MoveCheckError::NotDriven`] if the motors are off, and the errors of [`Arm::read`].
+    /// [`MoveCheckError::NotDriven`] if the motors are off, [`MoveCheckError::StoppedByAnother`], and the errors of [`Arm::read`].
     pub fn begin(arm: &mut Arm, joints: u8) -> Result<Self, MoveCheckError> {
         let mut check = Self::idle(arm, joints);
         check.read(arm)?;
@@ -131,7 +131,8 @@ impl MoveCheck {
         self.0.end();
     }
 
-    /// Checks the answer that has arrived, and asks again when it is time. Waits only after a fault, to read its cause.
+    /// Checks the answer that has arrived, and asks again when it is time. Waits only after a fault, to read its cause. Does
+    /// nothing for firmware without a status block.
     ///
     /// # Errors
     /// As [`Self::check`]. Also [`MoveCheckError::Exchange`] if no answer came for 1.5 s, to three questions or more.

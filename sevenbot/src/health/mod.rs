@@ -129,7 +129,7 @@ impl Health {
     }
 
     /// The joints among `joints` ([`Joint::bit`]s) that are not at their targets, each with its position and target in degrees.
-    /// Joints that were not measured are left out, and so is a gripper that holds something.
+    /// Joints without a position are left out, and so is a gripper that holds something.
     #[must_use]
     pub fn away_from_targets(&self, joints: u8) -> Vec<(Joint, u8, u8)> {
         let ours = self.joints.iter().filter(|joint| joints & joint.joint.bit() != 0);

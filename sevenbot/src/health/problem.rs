@@ -221,6 +221,7 @@ impl ProblemKind {
     }
 
     /// Does this problem end moves? A problem of a joint ends the moves of that joint, a problem of the arm ends all moves.
+    /// `false` for an alarm, although a new one ends a move after 3 s.
     #[must_use]
     pub const fn ends_moves(self) -> bool {
         matches!(

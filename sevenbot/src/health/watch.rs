@@ -51,7 +51,7 @@ pub enum MoveFault {
         /// The value of register 29.
         state: u8,
     },
-    /// The arm has not answered for 1.5 s.
+    /// The arm has not answered for 1.5 s, nor to the last three questions.
     Silent,
     /// Another program stopped the arm through the server that both use, or ended this program's stream.
     StoppedByAnother,
@@ -140,7 +140,7 @@ impl MoveWatch {
         self
     }
 
-    /// For a recording of all joints: only a problem that hides positions ends it, and the motors may be off.
+    /// For a recording of all joints: only silence or a problem that hides positions ends it, and the motors may be off.
     #[must_use]
     pub const fn of_positions(mut self) -> Self {
         self.joints = ALL_JOINTS;

@@ -42,14 +42,14 @@ pub struct HoldError(#[from] pub WriteError);
 impl Arm {
     /// Makes every joint hold its present position, and verifies the targets. Returns the joints as read back.
     ///
-    /// - If the motors do not drive the joints (state 0 or 2), writes nothing.
+    /// - If the motors do not drive the joints (state 0 or 2), writes no targets.
     /// - A joint whose servo does not answer gets its last measured position as its target, and none if it was never
     ///   measured.
     /// - After power-up waits up to 0.7 s for the joints that are not measured yet. The other joints hold at once.
     /// - A stream of another program ends at each joint. Its set-point period stays as it was ([D23](protocol_core::decisions#d23)).
     ///
     /// # Errors
-    /// No answer, or the arm does not take the targets: it may be moving.
+    /// An exchange failed, or the arm does not take the targets: it may be moving.
     pub fn hold(&mut self) -> Result<JointSnapshot, HoldError> {
         self.hold_through_restarts().map(|(joints, _)| joints)
     }
@@ -156,13 +156,14 @@ pub enum HoldStep {
     Holds(JointSnapshot),
     /// The motors do not drive the joints: there is nothing to stop.
     NotDriven(JointSnapshot),
-    /// The arm does not take these targets. It may be moving.
+    /// The arm does not take these targets, or the speeds to restore. It may be moving.
     NotTaken(NotTaken),
 }
 
 impl Hold {
     /// A stop that acts before the first read: it slows all joints down, and sends them to where they were measured last, if
-    /// that is known. It writes this again every 100 ms until the arm confirms it. The speeds are restored at the end.
+    /// that is known. It writes this again every 100 ms until the arm confirms it. The speeds are restored at the end; without
+    /// `known`, to their defaults. If the motors are off in `known`, it writes nothing before the first read.
     #[must_use]
     pub fn at_once(known: Option<&HeldJoints>) -> Self {
         let speeds = known.map_or_else(

@@ -8,7 +8,7 @@ use crate::arm::Arm;
 use crate::movement_run::{MovementRun, RunStep};
 use crate::stream::SetPointStream;
 
-/// The longest time between two calls of the observer.
+/// The longest wait between two calls of the observer.
 pub(super) const POLL_PERIOD: Duration = Duration::from_millis(20);
 
 /// Where the steps of a run go.

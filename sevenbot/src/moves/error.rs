@@ -47,7 +47,7 @@ pub enum MoveError {
     StillMoving {
         /// Bit 0 is joint 1.
         bits: u8,
-        /// The time since the start of the move.
+        /// How long the call waited for them.
         after: Duration,
     },
     /// Joints have settled away from their targets.

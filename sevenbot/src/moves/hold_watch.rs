@@ -16,14 +16,14 @@ use crate::arm::Arm;
 use crate::health::{MoveCheck, Problem, ProblemKind};
 use crate::joints::{JointSnapshot, bits};
 
-/// The arm needs at most 200 ms to notice that a servo has let go (D28), and less to notice that a servo is silent.
+/// The arm usually notices within 300 ms that a servo has let go (D28), and sooner that a servo is silent.
 const WATCH_TIME: Duration = Duration::from_millis(500);
 /// A joint whose target still changes after this time does not hold. The arm reports a joint that gives way as blocked
 /// after a second (D27).
 const LONGEST_WATCH: Duration = Duration::from_millis(2_000);
 const POLL_PERIOD: Duration = Duration::from_millis(50);
-/// A target that the arm itself gives a joint is at most this far from the joint: a joint that pushes with the default limit is
-/// at most 4 degrees from its set-point (D27).
+/// A target that the arm itself gives a joint is at most this far from the joint: on the simulated arm, a joint that pushes with
+/// the default limit is at most 4 degrees from its set-point (D27).
 const OWN_TARGET_DEGREES: u8 = 4;
 /// A joint that is further than this from its target, and further than at the start, does not hold. A loaded joint droops by
 /// up to 1.5 degrees, and one that was stopped at speed comes back to its target.
@@ -90,9 +90,10 @@ impl Arm {
     /// as its target. Then the watch goes on for another half second, until the joint stays or the arm reports a problem.
     ///
     /// # Errors
-    /// The motors do not drive the joints, a joint is silent, blocked or let go, a servo has an alarm, the supply was lost, the
-    /// controller restarted, another program wrote a target, or an exchange failed. [`MoveError::NotHeld`] if a joint is further
-    /// than 10 degrees from its target at the end, and further than at the start, or still gives way after 2 seconds.
+    /// The motors do not drive the joints, a joint is silent, let go or newly blocked, a servo has an alarm, the supply was lost,
+    /// the controller restarted, another program stopped the arm or wrote a target further than 4 degrees away, or an exchange
+    /// failed. [`MoveError::NotHeld`] if a joint is further than 10 degrees from its target at the end, and further than at the
+    /// start, or still gives way after 2 seconds.
     pub fn watch_hold(&mut self) -> Result<(), MoveError> {
         let mut check = MoveCheck::begin(self, bits(Joint::ALL))?;
         let mut begun = self.joints()?;

@@ -45,7 +45,7 @@ impl Arm {
     ///
     /// # Errors
     /// [`MoveError::NotDriven`] if the motors do not drive the joints, [`MoveError::Problems`] if a lost supply is the reason,
-    /// and the errors of [`Arm::read`].
+    /// and the errors of [`Arm::read`] and [`Arm::end_abandoned_stream`].
     pub fn driven_joints(&mut self) -> Result<JointSnapshot, MoveError> {
         let joints = self.wait_until_settled()?;
         if joints.is_driven() {
@@ -90,8 +90,8 @@ impl JointMove {
     /// Sends the targets, and verifies that the arm took them. Joints with neighbouring numbers start together.
     ///
     /// # Errors
-    /// A joint with a target cannot be driven now: [`MoveError::Problems`], and nothing was sent. Or the arm does not take the
-    /// targets, or an exchange failed.
+    /// The motors are off, or a joint with a target cannot be driven now ([`MoveError::Problems`]): nothing was sent. Or the arm
+    /// does not take the targets or carry them out, another program stopped it, or an exchange failed.
     pub fn begin(arm: &mut Arm, targets: Targets) -> Result<Self, MoveError> {
         let check = MoveCheck::begin(arm, joints_of(&targets))?;
         let plan = arm.read_span(Span::between(&SPEED, &PRESENT_POSITION))?;
@@ -117,7 +117,7 @@ impl JointMove {
         Self::sent(arm, whole, 0, plan, check)
     }
 
-    /// As [`Self::begin_fine`], at this pace. If the arm does not take the move, the speeds and durations stay as they were.
+    /// As [`Self::begin_fine`], at this pace. After a failure, restores the speeds and durations, unless a joint moves.
     ///
     /// # Errors
     /// The errors of [`JointMove::begin`] and [`Pace::set`].
@@ -129,8 +129,8 @@ impl JointMove {
         let before = PaceBefore::read(arm, &targets)?;
         let begun = pace.set(arm, &targets).and_then(|()| Self::begin_fine(arm, targets));
         if begun.is_err() {
-            // A second failure has the same reason, so it is ignored. The arm may have taken the targets: `put_back` writes
-            // nothing while a joint moves.
+            // A second failure is ignored, because the first one tells more. The arm may have taken the targets: `put_back`
+            // writes nothing while a joint moves.
             let _ = before.put_back(arm);
         }
         begun
@@ -162,12 +162,13 @@ impl JointMove {
         self.is_rounded
     }
 
-    /// Waits until all joints have arrived. Returns their positions in degrees.
+    /// Waits until the joints with a target have arrived. Returns the positions of all joints in degrees.
     ///
     /// # Errors
-    /// A joint with a target is blocked, let go or silent, the supply was lost, or the controller restarted:
-    /// [`MoveError::Problems`]. A joint still moves 5 s after twice the duration of the move, or settles away from its target;
-    /// the observer ends the wait; or an exchange failed.
+    /// A joint with a target is blocked, let go or silent, a servo has a new alarm, the supply was lost, or the controller
+    /// restarted: [`MoveError::Problems`]. The motors do not drive the joints, or another program stopped the arm. A joint still
+    /// moves 5 s after twice the duration of the move, or settles away from its target; the observer ends the wait; or an
+    /// exchange failed.
     pub fn finish(&self, arm: &mut Arm, observer: &mut dyn Observer) -> Result<[u8; 7], MoveError> {
         let mut check = self.check.clone();
         self.wait_until_still(arm, &mut check, observer)?;

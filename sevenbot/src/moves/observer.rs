@@ -43,8 +43,8 @@ impl Stage {
 /// assert!(watch.goes_on() && !watch.goes_on());
 /// ```
 pub trait Observer {
-    /// Does the call go on? Asked between two reads, every 50 ms or more often while the arm answers at once. `false` ends
-    /// the call with [`MoveError::Interrupted`](super::MoveError).
+    /// Does the call go on? Asked between reads, with waits of at most 50 ms besides the reads. `false` ends the call with
+    /// [`MoveError::Interrupted`](super::MoveError).
     fn goes_on(&mut self) -> bool {
         true
     }

@@ -79,8 +79,8 @@ impl Arm {
     /// 15 s in any other.
     ///
     /// # Errors
-    /// The arm does not reach the pose. Or a joint moves by more than 2 degrees when it is let go, or still moves after 5 seconds,
-    /// or the observer ends the check: then the arm holds again.
+    /// The arm does not reach the pose, or an exchange failed. Or a joint moves by more than 2 degrees when it is let go, still
+    /// moves after 5 seconds or has a problem, or the observer ends the check: then the arm holds again.
     pub fn park(
         &mut self,
         pose: Option<FineTargets>,

@@ -98,7 +98,7 @@ impl Player {
         self.played
     }
 
-    /// Could the speeds and durations not be restored, as on a lost connection? Then the arm keeps the values of the playback.
+    /// Could the speeds and durations not be restored, as on a lost connection? Then the arm may keep the values of the playback.
     #[must_use]
     pub const fn has_left_pace(&self) -> bool {
         self.has_left_pace
@@ -110,14 +110,16 @@ impl Player {
         &self.measured
     }
 
-    /// Plays this many times; 0: until the observer ends the playback. If the observer ends it, the arm holds. Restores the
-    /// speeds and durations that the arm had before. The motors must drive the joints: [`Arm::driven_joints`].
+    /// Plays until the recording was played this many times, earlier calls included; 0: until the observer ends the playback. If
+    /// the observer ends it, the arm holds. Restores the speeds and durations that the arm had before. The motors must drive the
+    /// joints: [`Arm::driven_joints`].
     ///
     /// # Errors
     /// The first pose is too far from where the arm stands or, if `times` is not 1, from the last pose: then nothing is
-    /// moved. A joint is blocked, let go or silent, the supply was lost, or the controller restarted:
-    /// [`MoveError::Problems`]. The observer ended the playback, this program paused for too long, the arm did not take a value
-    /// or reach a pose, its reports ended, or an exchange failed.
+    /// moved. A joint is blocked, let go or silent, a servo has a new alarm, the supply was lost, or the controller restarted:
+    /// [`MoveError::Problems`]. The motors do not drive the joints, or another program stopped the arm. The observer ended the
+    /// playback, this program paused for too long, the arm did not take a value or reach a pose, its reports ended, or an exchange
+    /// failed.
     pub fn play(&mut self, arm: &mut Arm, times: u32, observer: &mut dyn Observer) -> Result<(), MoveError> {
         self.check_start(arm, times)?;
         let Some(first) = self.moments.first() else { return Ok(()) };
@@ -145,7 +147,7 @@ impl Player {
         times: u32,
         observer: &mut dyn Observer,
     ) -> Result<(), MoveError> {
-        // Checks between the moves. Each move has a check of its own.
+        // Checks between the moves. A joint move and a stream have checks of their own, steps in whole degrees have none.
         let mut check = MoveCheck::begin(arm, 0)?;
         check.end();
         while times == 0 || self.played < times {
@@ -218,7 +220,7 @@ impl Player {
     fn stream(&self, tape: &mut Tape, arm: &mut Arm, observer: &mut dyn Observer) -> Result<(), MoveError> {
         let options = StreamOptions::new(PERIOD_MS).ok_or(StreamError::NoExtendedBlock)?;
         let mut stream = SetPointStream::open(arm, options)?;
-        // The points set the speed, so the registers must not limit it. The recording was checked, and the arm is at its
+        // The points set the speed, so the registers must not limit it. The caller has checked the recording, and the arm is at its
         // first pose. The stream is opened first: if this program dies, the next one resets the speeds only if it finds an
         // abandoned stream.
         let unlimited = stream.arm().write_checked(SPEED.address, &[Speed::MAXIMUM.steps(); 7]);

@@ -67,8 +67,8 @@ impl Recorder {
     /// The next pose; `None` if none arrives within `timeout`.
     ///
     /// # Errors
-    /// A servo does not answer, so that its position is unknown, or the controller restarted: [`MoveError::Problems`]. The port
-    /// failed, or no report has arrived for three seconds.
+    /// A servo does not answer, so that its position is unknown, or the controller restarted: [`MoveError::Problems`]. An
+    /// exchange failed, or no report has arrived for three seconds.
     pub fn next(&mut self, arm: &mut Arm, timeout: Duration) -> Result<Option<RecordedPose>, MoveError> {
         self.check.poll(arm)?;
         if let Some(report) = arm.next_report(timeout)? {

@@ -55,7 +55,8 @@ pub enum GuardedMoveError {
 
 impl Arm {
     /// Checks the way from the measured positions to these targets, at this pace. A speed or duration that `pace` leaves open
-    /// comes from the registers. Joints without a target stay at their measured positions.
+    /// comes from the registers; with a duration, an open speed is the maximum. Joints without a target stay at their measured
+    /// positions.
     ///
     /// # Errors
     /// The guard does not allow the way, or an exchange failed.

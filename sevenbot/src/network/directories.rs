@@ -3,18 +3,18 @@
 use std::env;
 use std::path::{Path, PathBuf};
 
-/// The directory of the servers' files: `7bot` in `XDG_RUNTIME_DIR`, otherwise in the state directory. `None` if it cannot be
-/// created, if others can write there, or if the system is not Unix.
+/// The directory of the servers' files: `7bot` in `XDG_RUNTIME_DIR`, otherwise in [`state_base`]. `None` if neither is known, if
+/// it cannot be created, if it belongs to another user, if others can write there, or if the system is not Unix.
 pub(super) fn runtime_directory() -> Option<PathBuf> {
     private(absolute("XDG_RUNTIME_DIR").or_else(state_base)?)
 }
 
-/// The directory for files that outlive the session: `7bot` in the state directory. `None` as for [`runtime_directory`].
+/// The directory for files that outlive the session: `7bot` in [`state_base`]. `None` as for [`runtime_directory`].
 pub(super) fn state_directory() -> Option<PathBuf> {
     private(state_base()?)
 }
 
-/// `XDG_STATE_HOME`, or `~/.local/state`.
+/// `XDG_STATE_HOME`, or `~/.local/state`; `None` if neither is an absolute path.
 fn state_base() -> Option<PathBuf> {
     absolute("XDG_STATE_HOME").or_else(|| Some(absolute("HOME")?.join(".local/state")))
 }

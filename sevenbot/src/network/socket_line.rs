@@ -60,7 +60,7 @@ impl SocketLine {
     /// [`CERTIFICATE_VARIABLE`](super::CERTIFICATE_VARIABLE), or be signed by one there.
     ///
     /// # Errors
-    /// There is no such server, or it cannot be reached.
+    /// There is no such server, it cannot be reached, or its certificate is not trusted.
     pub fn connect(address: &Address, token: Option<&str>) -> Result<Self, OpenError> {
         let token = token.map(str::to_owned).or_else(Address::token);
         let token = token.as_deref();

@@ -7,7 +7,7 @@
 //!   0.033   91  90  65  90  90  90  80   0
 //! ```
 //!
-//! Version 2 has angles with up to two decimals, for arms with the extended block; version 1 has whole degrees.
+//! Version 2 has angles with up to two decimals, as the extended block takes them; version 1 has whole degrees.
 //!
 //! The joints move evenly between two moments. So a movement written by hand needs a line only where its direction or
 //! speed changes.
@@ -60,19 +60,19 @@ pub struct Recording {
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum RecordingError {
-    /// The first line is not the header of a recording.
+    /// The first line that is neither empty nor a comment is not the header of a recording.
     #[error("this is not a recording: it does not start with `{FORMAT} 1` or `{FORMAT} 2`")]
     NotARecording,
-    /// The version of the format is neither 1 nor 2.
+    /// The version of the format is neither 1 nor 2, or more words follow.
     #[error("the recording has version `{0}`; this program reads versions 1 and 2")]
     OtherVersion(String),
     /// There is no moment; a recording needs at least one.
     #[error("the recording contains no movement")]
     Empty,
-    /// A line of the text is refused, or a moment of [`Recording::of_moments`].
+    /// A line of the text is refused, or a moment of [`Recording::of_moments`], or a joint would be too fast.
     #[error("line {number}: {cause}")]
     Line {
-        /// The line number, from 1.
+        /// The line number from 1; without a text, the number of the moment.
         number: usize,
         /// The wrong field or time, or the joint that would be too fast.
         cause: LineError,
@@ -83,7 +83,7 @@ impl Recording {
     /// Parses a recording.
     ///
     /// # Errors
-    /// The first line that is refused.
+    /// The text has no header or no moment, or another version. Otherwise the first line that is refused.
     pub fn parse(text: &str) -> Result<Self, RecordingError> {
         let mut lines = (1..).zip(text.lines()).filter(|(_, line)| has_content(line));
         let version = header(lines.next().map(|(_, line)| line))?;
@@ -176,7 +176,7 @@ fn too_fast(from: &Moment, to: &Moment, factor: f64) -> Option<LineError> {
         .map(|(joint, degrees)| LineError::TooFast { joint, degrees_per_second: degrees / seconds })
 }
 
-/// The lines at the start of every recording. A line for each moment follows ([`Moment::line`]).
+/// The lines at the start of a recording. A line for each moment follows ([`Moment::line`]).
 #[must_use]
 pub fn head(version: FileVersion) -> String {
     format!("{FORMAT} {}\n# seconds  joints 1 to 7 in degrees  vacuum (1: suck)\n", version.word())

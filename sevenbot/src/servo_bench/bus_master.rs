@@ -55,7 +55,7 @@ pub struct BusMaster {
     waiting: Vec<u8>,
     has_echo: bool,
     received: ReceiveCounts,
-    /// The ids of answers that came after their timeout.
+    /// The ids of good frames that were neither an echo nor the answer waited for, such as answers after their timeout.
     late: Vec<u8>,
 }
 
@@ -185,7 +185,7 @@ impl BusMaster {
     }
 
     /// Counts further answers of this id until no byte arrives for `timeout`. One or more means that several servos have the
-    /// id.
+    /// id, unless an earlier answer came after its timeout.
     pub(crate) fn extra_answers(&mut self, id: u8, timeout: Duration) -> Result<usize, ServoError> {
         self.late.clear();
         self.wait_for_silence(timeout)?;

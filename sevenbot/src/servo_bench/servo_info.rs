@@ -131,7 +131,7 @@ impl RegisterBlock {
         Ok(Self { first, errors: answer.errors, values: answer.values })
     }
 
-    /// The value of a register; 0 if the block does not include it.
+    /// The value of a register, which must not be before the block; 0 if it is behind the block.
     fn byte(&self, register: u8) -> u8 {
         let place = usize::from(register.saturating_sub(self.first));
         self.values.get(place).copied().unwrap_or(0)

@@ -148,7 +148,8 @@ impl SimulatedArms {
     /// ```
     ///
     /// # Errors
-    /// A measurement is not a number (the first one is named), or the time or a length is wrong. Then nothing is done.
+    /// A measurement is refused ([`StepError::Measured`], the first one is named), or the time or a length is wrong. Then nothing
+    /// is done.
     pub fn exchange<T: Number, N: Number>(
         &mut self,
         measured: &[T],

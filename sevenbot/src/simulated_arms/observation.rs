@@ -14,7 +14,8 @@ pub const POSITIONS: Range<usize> = 0..7;
 pub const VELOCITIES: Range<usize> = 7..14;
 /// Loads in percent of the stall torque.
 pub const LOADS: Range<usize> = 14..21;
-/// The tip in millimetres, x, y, z, by the measured positions; NaN if one of joints 1 to 5 was not measured.
+/// The tip in millimetres, x, y, z, by the measured positions; NaN if one of joints 1 to 5 was not measured. Only z does not need
+/// joint 1.
 pub const TIP: Range<usize> = 21..24;
 /// 1 for a joint that an obstacle keeps from its target, otherwise 0.
 pub const BLOCKED: Range<usize> = 24..31;

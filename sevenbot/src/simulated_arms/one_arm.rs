@@ -20,7 +20,7 @@ const UNMEASURED: FineState = FineState { positions: [None; 7], velocities: [0; 
 pub(crate) struct SteppedArm {
     pub(crate) simulation: Simulation,
     pub(crate) seed: u64,
-    /// The set-point period that was written, in milliseconds.
+    /// The set-point period that [`Self::send`] wrote last, in milliseconds.
     period: Option<u16>,
     state: FineState,
     /// Bit n-1 is joint n.

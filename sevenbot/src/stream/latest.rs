@@ -40,8 +40,9 @@ pub struct LatestCounts {
 /// The points of a program that offers actions at any time.
 ///
 /// A point is due each period. It is the newest action; without a new one the last point is sent again, so that a damaged frame
-/// costs no action. Once the program has offered nothing for the time of the watchdog, nothing more is sent, and the watchdog of
-/// the arm acts after the same time again (D24). The joints stand at the last point then (D23).
+/// costs no action. Once the program has offered nothing for the time of the watchdog, nothing more is sent but an action that
+/// waits for its point. The watchdog of the arm acts when its time has passed since the last frame (D24). The joints
+/// stand at the last point then (D23).
 ///
 /// ```
 /// use sevenbot::FineAngle;
@@ -185,7 +186,8 @@ impl Leading {
         watchdog.is_some_and(|time| now >= self.offered + time)
     }
 
-    /// When to ask. By then the watchdog has acted, because the last frame was sent before the program counted as silent.
+    /// When to ask. By then the watchdog has acted, because the last frame was sent before the program counted as silent. Only an
+    /// action that waits for its point for longer than the watchdog's time is sent later.
     fn asks_at(&self, watchdog: Option<Duration>) -> Duration {
         self.offered + 2 * watchdog.unwrap_or_default() + WATCHDOG_MARGIN
     }

@@ -32,7 +32,7 @@ pub struct StreamPace {
 pub struct PaceCounts {
     /// Points that were sent, without those that were passed over.
     pub points: u32,
-    /// Points later than a quarter of the period, and points that were passed over.
+    /// Points later than a quarter of the period, points that were passed over, and pauses.
     pub late: u32,
     /// The largest time between two points.
     pub largest_gap: Duration,

@@ -1,7 +1,7 @@
 //! Measures how the arm behaves at obstacles, with the image in the emulator as the controller: `cargo xtask obstacles` builds
 //! the image and runs this.
 //!
-//! It runs a few of the experiments of `torture obstacles`, and prints the same tables. The experiments run in real time, so a
+//! It runs a few of the experiments of `torture obstacles`, and prints their tables. The experiments run in real time, so a
 //! busy machine increases the figures.
 
 use std::error::Error;

@@ -33,7 +33,8 @@ pub struct EmulatedArm {
 }
 
 impl EmulatedArm {
-    /// Starts the image and its servos, and waits until the image receives host bytes. Collisions of the arm are ignored.
+    /// Starts the image and its servos, and waits until the image receives host bytes. Collisions on
+    /// the servo bus are not simulated.
     pub fn start() -> TaskResult<Self> {
         let (mut machine, bus) = Machine::start_with_bus(tempfile::tempdir()?, &[])?;
         machine.host.set_nonblocking(true)?;

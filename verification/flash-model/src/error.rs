@@ -11,9 +11,9 @@ pub enum Error {
     Misused(NorFlashErrorKind),
     /// Erases are forbidden: see [`Flash::forbid_erase`](crate::Flash::forbid_erase).
     EraseForbidden,
-    /// The word was programmed before with another value, completely or in part.
+    /// The word was programmed before with another value, completely or in part, or held one when the flash was created.
     ProgrammedTwice,
-    /// The last erase of the sector was cut.
+    /// An erase of the sector was cut half way, and no complete erase followed.
     HalfErased,
 }
 

@@ -47,7 +47,7 @@ pub struct Flash<const SECTOR: usize, const WORD: usize = 4> {
     unprogrammable: Vec<Bits>,
     /// The operations since the last power-up.
     history: Vec<Operation>,
-    /// Sectors whose erase was cut, bit n for sector n.
+    /// Sectors whose erase was cut half way, bit n for sector n.
     half_erased: u64,
     /// Sectors that an erase does not change, bit n for sector n.
     worn_out: u64,

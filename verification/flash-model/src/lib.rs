@@ -1,11 +1,11 @@
 //! A NOR flash for tests: stricter than a real one, and deterministic.
 //!
 //! - Programming clears bits, word by word. Programming a word twice with different values without an erase between them
-//!   is an error, even if the first program was cut.
+//!   is an error, even if the first program was cut. A first value of all ones does not count.
 //! - The power can be cut at any operation: one word programmed or one sector erased. [`ProgramTear`] and [`EraseTear`]
 //!   list the states that a cut leaves. After a cut every access fails until [`Flash::power_up`].
 //! - A *marginal* bit is a partly charged cell. It reads the same until the next power-up, then perhaps the opposite.
-//! - A sector whose erase was cut may read as anything, even as blank. Programming it before a complete erase is an error.
+//! - A sector whose erase was cut half way may read as anything, even as blank. Programming it before a complete erase is an error.
 //! - Erases can be forbidden, sectors and cells wear out, bits flip. An inert flash changes nothing, as in an emulator.
 //!
 //! The flash of a chip also has a [`Cache`], a [`FlashSupply`] and a [`Comparator`] that monitors the supply. A model of a chip

@@ -52,7 +52,7 @@ pub struct CampaignResult {
     pub worlds: BTreeMap<&'static str, (u64, WorldCounts)>,
     /// The failed world with the lowest seed; `None` if no world failed.
     pub failure: Option<Box<FailedWorld>>,
-    /// The trials of the parser; empty if a world failed.
+    /// The trials of the parser; empty if a world failed, or if the plan skips them.
     pub parser_trials: Vec<ParserTrial>,
     /// The sum of all trials of free motion; zero if a world failed.
     pub free_motion: FreeMotionTrial,

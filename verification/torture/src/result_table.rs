@@ -13,7 +13,8 @@ use crate::world_counts::WorldCounts;
 /// A row: the trial, the amount of work, and the failures.
 pub type ResultRow = [String; 3];
 
-/// A row for each scenario, for the total and for each trial, then the seed and the speed of the simulation.
+/// A row for each scenario with a completed world, for each total, for each trial and for the failed world, then the seed and the
+/// speed of the simulation.
 #[derive(Debug)]
 pub struct ResultTable<'a>(pub &'a CampaignPlan, pub &'a CampaignResult);
 

@@ -64,7 +64,7 @@ pub struct Scenario {
     pub mean_interval: Duration,
     /// Each entry has the same probability, so a fault that is listed twice is twice as likely.
     pub faults: &'static [InjectedFault],
-    /// The number of writes of settings in a thousand writes.
+    /// The number of writes of settings in a thousand writes, apart from those for the extended block.
     pub settings_per_mille: u64,
     /// The number of power cuts in a hundred starts.
     pub cut_starts_percent: u64,

@@ -50,13 +50,13 @@ pub enum ProgramFault {
     TooLarge,
     /// Blocks are nested more than 60 deep. Blocks below one another do not count.
     TooDeep,
-    /// The block that starts a program is missing.
+    /// The block that starts a program is missing or disabled.
     NoStart,
     /// More than one block starts the program.
     SeveralStarts,
     /// The parser does not know this kind of block.
     UnknownBlock(String),
-    /// This input of the block is empty.
+    /// This input of the block is empty, or the block in it is disabled.
     EmptyInput(String),
     /// This field of the block is missing or has an invalid value.
     BadField(String),

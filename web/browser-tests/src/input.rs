@@ -134,7 +134,7 @@ impl Page {
         ));
     }
 
-    /// Moves all sliders, with the events that a person would cause, but without a pause between them.
+    /// Moves all sliders, with an `input` event for each, as a person would cause it, but without a pause between them.
     #[track_caller]
     pub fn slide_all(&mut self, degrees: [u32; 7]) {
         self.evaluate(&format!(

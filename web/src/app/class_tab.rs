@@ -36,7 +36,7 @@ impl ClassTab {
         self.member.as_ref()?.key().filter(|_| is_own).map(|key| format!("?token={key}"))
     }
 
-    /// Sends a message. Returns false if there is no open connection.
+    /// Sends a message. Returns false if there is no open connection, or if the socket did not accept the message.
     pub(super) fn send(&self, text: &str) -> bool {
         self.socket.as_ref().is_some_and(|socket| socket.send(text))
     }

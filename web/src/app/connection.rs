@@ -68,7 +68,7 @@ impl App {
     /// Connects to the arm behind the server: in a class, to the class's real arm.
     ///
     /// # Errors
-    /// The browser refuses the address, or this pupil does not have the class's real arm.
+    /// The page has no address, the browser refuses the address of the server, or this pupil does not have the class's real arm.
     fn server_arm(&self) -> Result<SocketSource, JsValue> {
         match &self.class {
             None => SocketSource::connect(),
@@ -98,8 +98,8 @@ impl App {
         SharingState::of(self.client.registers()).is_some_and(|sharing| sharing.is_read_only)
     }
 
-    /// As [`Self::only_watches`], but also shows a notice. A write or a stop by the user calls this. The buttons that begin a park,
-    /// a movement or a program are disabled instead.
+    /// As [`Self::only_watches`], but also shows a notice. [`Self::write`] and [`Self::stop`] call this. The buttons that begin a
+    /// park, a movement or a program are disabled instead.
     pub(super) fn refuses_to_drive(&self) -> bool {
         let only_watches = self.only_watches();
         if only_watches {

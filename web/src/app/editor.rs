@@ -16,7 +16,7 @@ const TEXT_OF_SCRIPT: &str = "programs";
 /// The id of the element that loads the script.
 const SCRIPT: &str = "editor-script";
 
-/// The editor. Before it is loaded, calls have no effect.
+/// The editor. Before it is loaded, only [`Self::load`] has an effect.
 #[derive(Clone, Copy)]
 pub(super) struct Editor;
 

@@ -157,7 +157,7 @@ fn lines(exercise: &Exercise, attempt: Option<&Attempt>, tag: &str) -> impl Iter
     })
 }
 
-/// Fills a list with one element of this kind for each text. Keeps existing elements.
+/// Fills a list with one element of this kind for each text. Keeps existing elements, and removes only those without a text.
 fn fill(dom: &Dom, id: &str, kind: &str, texts: impl Iterator<Item = String>) -> Result<(), JsValue> {
     let list: Element = dom.get(id)?;
     let texts: Vec<_> = texts.collect();

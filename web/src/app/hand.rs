@@ -34,7 +34,8 @@ pub(super) fn listen(dom: &Dom) -> Result<(), JsValue> {
         let event = app.scene.as_mut().and_then(Scene::pointer_left);
         app.scene_event(event);
     })?;
-    // A finger on the arm moves the arm, a finger elsewhere scrolls the page. Two fingers zoom the picture.
+    // A finger on a joint or the tip moves the arm, on the base it turns the camera, elsewhere it scrolls the page. Two fingers
+    // zoom the picture.
     on(&canvas, "touchstart", |app, touch: &TouchEvent, event| {
         if app.takes_touch(touch) {
             event.prevent_default();
@@ -117,7 +118,7 @@ impl App {
         breach.map(|breach| breach_text(&breach))
     }
 
-    /// Moves a dragged joint: with its motor, or by a simulated hand if the motors of a simulated arm are off.
+    /// Moves a dragged joint: with its motor, or by a simulated hand if the motors of a simulated arm are off or damped.
     fn drag_joint(&mut self, joint: u8, degrees: f32) {
         let is_driven = self.client.state().motor_state == motor_state::SERVO;
         let (Line::Simulated(source), Some(named), false) = (&mut self.line, Joint::new(joint), is_driven)

@@ -55,7 +55,7 @@ impl Line {
     }
 }
 
-/// The pupil's own arm while the page drives the class's real arm.
+/// The pupil's own arm while the pupil has the class's real arm.
 pub(super) struct OwnArm {
     pub(super) line: Line,
     pub(super) client: Client,
@@ -72,7 +72,7 @@ pub(super) struct App {
     pub(super) is_end_told: bool,
     /// The controls are disabled, because the server is read-only.
     pub(super) are_controls_off: bool,
-    /// `None` where the browser has no WebGL2.
+    /// `None` if the browser has no WebGL2, or if the graphics driver reported an error at the start.
     pub(super) scene: Option<Scene>,
     pub(super) plot: CanvasRenderingContext2d,
     pub(super) history: History,
@@ -102,7 +102,7 @@ pub(super) struct App {
     pub(super) tour_step: usize,
     /// `None` outside a class.
     pub(super) class: Option<ClassTab>,
-    /// `None` unless the page drives the class's real arm.
+    /// `None` unless this pupil has the class's real arm.
     pub(super) set_aside: Option<OwnArm>,
 }
 

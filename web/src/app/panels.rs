@@ -103,7 +103,7 @@ fn show_speed_and_pump(app: &App) {
     }
 }
 
-/// Shows all values as unknown, because no arm has answered yet.
+/// Shows the measured values as unknown, because no arm has answered yet.
 fn show_nothing_known(dom: &Dom, language: Language) {
     let unknown = language.text("not-measured");
     for number in 1..=7 {

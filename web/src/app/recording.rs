@@ -12,7 +12,7 @@ use super::page::App;
 use crate::movement::{PlayRefusal, Player};
 use crate::recorder::Recorder;
 
-/// The longest time to approach the first pose of a movement, in seconds.
+/// The longest time that a user can choose for the approach to the first pose of a movement, in seconds.
 const LONGEST_APPROACH: f32 = 60.0;
 
 impl App {

@@ -50,8 +50,8 @@ impl App {
         self.time_lines.preview = preview;
     }
 
-    /// The name of the text that says why no preview can begin now: there is no answer yet, the arm moves, its motors are off, or
-    /// a servo is silent. `None` if a preview can begin.
+    /// The name of the text that says why no preview can begin now: there is no answer yet, the arm moves, its motors are off or
+    /// damped, or a servo is silent. `None` if a preview can begin.
     fn no_preview(&self) -> Option<&'static str> {
         let is_busy = self.player.is_some() || self.park.is_some() || self.programs.run.is_some();
         let state = self.client.state();

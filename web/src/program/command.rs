@@ -112,7 +112,8 @@ pub(super) fn begin(command: &Command, now: Instant, client: &mut Client) -> Res
     }
 }
 
-/// Writes speeds and times for the joints with a target. The targets follow when the arm has confirmed these.
+/// Writes the speed and the time of `pace`, if it has any, for the joints with a target. The targets follow when the arm has
+/// confirmed these.
 fn set_pace(targets: FineTargets, pace: Pace, now: Instant, client: &mut Client) -> Action {
     let steps = |steps: u8| targets.map(|target| target.map(|_| steps));
     let speed = pace.speed.or(pace.time.map(|_| Speed::MAXIMUM));

@@ -21,7 +21,7 @@ pub enum ProgramFailure {
         /// The reason in English, and what is possible instead, if that is known.
         details: String,
     },
-    /// The firmware of the arm does not provide a value that the program reads.
+    /// The firmware of the arm does not provide a value that the program needs, or a joint was not measured.
     NotTold,
     /// These joints have other targets than the program has written: something else moves them.
     OtherTargets(Vec<Joint>),

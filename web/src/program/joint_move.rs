@@ -21,7 +21,7 @@ const MARGIN: Duration = Duration::from_secs(5);
 const SETTLE_TIME: Duration = Duration::from_secs(2);
 /// A joint that is slower than this is at rest, in degrees per second.
 const STILL: f32 = 1.0;
-/// The index of the claw's joint. A claw that holds something does not reach its target, so its target is not compared.
+/// The index of the claw's joint. The arm changes the target of a claw that an object stops (D27), so its target is not compared.
 const CLAW: usize = 6;
 
 /// A move whose targets the arm has confirmed.

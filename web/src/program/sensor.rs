@@ -13,7 +13,7 @@ use crate::stop::since_start;
 /// Reads a sensor.
 ///
 /// # Errors
-/// A servo is silent, so that its values are old, or the firmware does not provide the value.
+/// A servo is silent, so that its values are old, the firmware does not provide the value, or a joint was not measured.
 pub(super) fn read(sensor: Sensor, now: Instant, registers: &Snapshot) -> Result<Value, ProgramFailure> {
     MoveWatch::new(since_start(now), 0, BAUD).of_positions().registers(since_start(now), registers)?;
     let health = Health::new(registers);

@@ -79,8 +79,8 @@ impl Scene {
         Ok(true)
     }
 
-    /// Projects a point of the arm's frame, in mm, to CSS pixels from the top left of the canvas. `None` if the point is behind
-    /// the camera.
+    /// Projects a point of the arm's frame, in mm, to CSS pixels from the top left of the canvas. `None` as for
+    /// [`Camera::project`].
     #[must_use]
     pub fn project(&self, point: Vec3) -> Option<Vec2> {
         self.camera.project(point)

@@ -115,7 +115,7 @@ pub struct TipWish {
 /// The reason why the tip cannot be at a position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Refusal {
-    /// No angles reach the position.
+    /// No angles reach the position with the direction of the tool.
     OutOfReach(NoSolution),
     /// The guard of the workspace does not allow the pose.
     Guarded(Breach),
@@ -127,7 +127,7 @@ pub struct Unreachable {
     /// Out of reach, or refused by the guard.
     pub why: Refusal,
     /// For a position out of reach, the angles of the nearest pose with the same direction of the tool. `None` if there is none,
-    /// or if the guard does not allow the pose.
+    /// if the guard does not allow the pose, or if the guard refused the position.
     pub nearest: Option<Angles>,
 }
 

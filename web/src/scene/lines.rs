@@ -118,7 +118,7 @@ const UPPER_RIGHT: Stroke = [[2.0, 2.0], [2.0, 4.0]];
 const LOWER_LEFT: Stroke = [[0.0, 0.0], [0.0, 2.0]];
 const UPPER_LEFT: Stroke = [[0.0, 2.0], [0.0, 4.0]];
 
-/// The strokes of a character, in a field 2 wide and 4 high.
+/// The strokes of a character, in a field 2 wide and 4 high. Only the `y` goes below its field.
 const fn strokes(character: char) -> &'static [Stroke] {
     match character {
         '-' => &[MIDDLE],

@@ -283,7 +283,7 @@ fn accent(view: &View, palette: &Palette, part: Part) -> [f32; 4] {
 }
 
 /// The distinct corners of the arm in the layout of the arm's program, and their indices in the order of the triangles. So a
-/// corner that several triangles share is processed only once.
+/// corner that several triangles share is stored only once.
 fn corners(arm: &Arm) -> (Vec<[f32; CORNER]>, Vec<u16>) {
     let (mut corners, mut indices, mut known) = (Vec::new(), Vec::new(), HashMap::new());
     for (number, (_, mesh)) in (0_u8..).zip(arm.meshes()) {

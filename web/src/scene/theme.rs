@@ -57,7 +57,7 @@ pub struct Palette {
     pub hover: Rgb,
     /// A driven joint without a problem.
     pub joint_ok: Rgb,
-    /// A joint whose motor is off.
+    /// A joint whose motor is off or damped.
     pub joint_limp: Rgb,
     /// A stalled joint; every joint if the arm does not tell which servo has a fault.
     pub joint_fault: Rgb,

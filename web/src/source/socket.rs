@@ -28,7 +28,7 @@ impl SocketSource {
     /// Connects to the server that this page came from, with the query of the page's address, which contains the token.
     ///
     /// # Errors
-    /// The browser refuses the address.
+    /// The page has no address, or the browser refuses the address of the server.
     pub fn connect() -> Result<Self, JsValue> {
         let query = web_sys::window().ok_or("no window")?.location().search()?;
         Self::connect_with(&query)
@@ -37,7 +37,7 @@ impl SocketSource {
     /// Connects to the server that this page came from, with a query such as `?token=TOKEN`.
     ///
     /// # Errors
-    /// The browser refuses the address.
+    /// The page has no address, or the browser refuses the address of the server.
     pub fn connect_with(query: &str) -> Result<Self, JsValue> {
         let socket = WebSocket::new(&address("frames", query)?)?;
         socket.set_binary_type(BinaryType::Arraybuffer);

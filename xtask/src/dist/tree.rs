@@ -22,7 +22,7 @@ use crate::run::{TaskResult, empty_folder, root, run_command};
 
 /// Gives the arm and its adapter stable names, and the group `dialout` the right to open them.
 pub(super) const UDEV_RULE: &str = "lib/udev/rules.d/70-sevenbot.rules";
-/// Where the licences and the changes are.
+/// Where the README, the licences and the changes are.
 pub(super) const DOC: &str = "share/doc/sevenbot";
 /// The README for users who install the programs from an archive.
 const README: &str = include_str!("../../../packaging/README.txt");
@@ -36,7 +36,7 @@ const COMPLETIONS: [(&str, &str); 3] = [
 
 /// The files of an installation that are not programs. They do not depend on the processor.
 pub(super) struct CommonFiles {
-    /// The licences and the changes.
+    /// The README, the licences and the changes.
     pub(super) documents: Vec<PackedFile>,
     /// For Linux only: the manual pages, the completions and the udev rule.
     pub(super) linux: Vec<PackedFile>,

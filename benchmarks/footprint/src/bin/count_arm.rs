@@ -27,7 +27,7 @@ const START_MILLIS: u64 = 1_000;
 const CYCLES: u64 = 300;
 /// Control cycles from one write to the next. Torque is refreshed every 25 cycles, so writes meet each part of that period.
 const CYCLES_OF_WRITE: u64 = 11;
-/// Milliseconds of a control cycle. The controller is polled once per millisecond.
+/// Milliseconds of a control cycle. The main loop runs once per millisecond.
 const CYCLE_MILLIS: u64 = 10;
 
 const READ: u8 = Instruction::Read as u8;

@@ -1,5 +1,5 @@
 //! Counts the instructions of a server that parses nothing and returns each piece. The size of this program is subtracted
-//! from the sizes of the other programs.
+//! from the sizes of the other programs that count a server.
 
 #![no_std]
 #![no_main]

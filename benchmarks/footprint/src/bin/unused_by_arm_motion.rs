@@ -1,4 +1,4 @@
-//! The parts of motion-core, called directly, also with inputs that the controller never passes to them.
+//! Parts of motion-core, called directly, also with inputs that the controller never passes to them.
 
 #![no_std]
 #![no_main]

@@ -1,4 +1,4 @@
-//! Random poses for all tests.
+//! Random legal poses that several tests share.
 
 use fastrand::Rng;
 use kinematics::forward;

@@ -56,7 +56,7 @@ fn d29_a_servo_that_restarted_engages_where_it_is_also_near_its_set_point() {
     let restarted_at = rig.now_us;
     rig.run_ms(1_000);
     assert_eq!((rig.get(LET_GO), rig.plant.torque(joint(2))), (0, Some(Torque::On)));
-    // Until its first answer, only questions are sent to the servo. The first frame after that is a goal.
+    // Soon after the restart, only questions are sent to the servo until its first answer. The first frame after that is a goal.
     let to_servo = |told: &ToServos| match told {
         ToServos::Goals(goals) => goals.iter().any(|&(id, _)| id == 1),
         ToServos::Torque(codes) => codes[1].is_some(),

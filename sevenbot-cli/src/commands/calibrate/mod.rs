@@ -5,7 +5,7 @@
 //!   then: question ──▶ lock open, write, read back, lock closed ──▶ restart ──▶ read again
 //! ```
 //!
-//! No offset is written before the question.
+//! No offset is written before the question. With `--yes` there is no question, and no restart.
 
 mod offsets;
 
@@ -168,7 +168,7 @@ fn ask_offset(arm: &mut Arm, joint: Joint, offset: i16) -> Result<i16, CommandEr
     }
 }
 
-/// Moves one joint. If the arm refuses the move, warns and continues.
+/// Moves one joint. A refused step, and a joint that does not arrive, are only warnings; other failures end the command.
 fn nudge(arm: &mut Arm, joint: Joint, degrees: i16) -> Result<(), CommandError> {
     let moved = hold_on_interrupt(arm, |arm, interrupt| {
         let wanted = step_target(&arm.driven_joints()?, joint, degrees)?;

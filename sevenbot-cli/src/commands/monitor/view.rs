@@ -53,7 +53,7 @@ pub(crate) enum UiCommand {
     Jog { axes: JogAxes, millimetres: [i16; 3] },
     /// Apply the change to the speed of this joint, and set the speed of all joints to the result.
     SpeedChange { joint: Joint, change: SpeedChange },
-    /// Write this motor state (register 29).
+    /// Change to this motor state (register 29). State servo makes an arm that is driven already hold.
     State(u8),
     /// Make the arm hold where it is.
     Stop,

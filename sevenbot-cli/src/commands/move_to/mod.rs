@@ -61,7 +61,8 @@ fn take(
     session.printer.print(&arrival.with_measured(measured))
 }
 
-/// Shows the move without an arm, as this project's firmware would make it: with targets in hundredths of a degree.
+/// Shows the move without an arm, as this project's firmware would make it: with targets in hundredths of a degree, or in whole
+/// degrees if the rounded hundredths break a limit.
 fn print_without_arm(
     session: &mut Session,
     args: &MoveToArgs,

@@ -1,5 +1,5 @@
-//! Reads targets, velocities, loads and health during a recording: once for each report, or less often on a slow line. The
-//! poses come from the reports.
+//! Reads targets, velocities and loads during a recording: once for each report, or less often on a slow line. Reads the health
+//! at most once a second. The poses come from the reports.
 
 use std::time::{Duration, Instant};
 

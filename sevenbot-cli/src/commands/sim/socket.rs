@@ -21,8 +21,8 @@ pub(super) struct SimulatorConnection {
 }
 
 impl SimulatorConnection {
-    /// Connects to the simulator with this control socket. Without one, connects to the simulator whose arm has this port;
-    /// without either, to the only simulator that runs.
+    /// Connects to the simulator with this control socket. Without one, looks in the default directory for the simulator whose
+    /// arm has this port; without either, for the only one.
     pub(super) fn open(control: Option<&Path>, port: Option<&str>) -> Result<Self, CommandError> {
         if let Some(path) = control {
             return Self::connect(path).map_err(|reason| unreachable(path, &reason));
@@ -106,7 +106,7 @@ impl SimulatorConnection {
     }
 }
 
-/// The ports of the simulators that run.
+/// The ports of the running simulators whose control sockets are in the default directory.
 pub(crate) fn running_ports() -> Vec<String> {
     let mut found: Vec<_> =
         sockets().iter().filter_map(|path| SimulatorConnection::connect(path).ok()).collect();
@@ -126,7 +126,7 @@ fn sockets() -> Vec<PathBuf> {
     paths
 }
 
-/// The directory in which host-sim creates its control sockets: see `host_sim::control::path`.
+/// The directory in which host-sim creates its control sockets by default: see `host_sim::control::path`.
 fn directory() -> Option<PathBuf> {
     let absolute = |name| env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute());
     let directory = absolute("XDG_RUNTIME_DIR").or_else(|| absolute("XDG_STATE_HOME"));

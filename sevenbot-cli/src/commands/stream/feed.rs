@@ -8,7 +8,7 @@ use sevenbot::fine::FineTargets;
 
 use super::input::TimedPoint;
 
-/// The most points that wait: more than the input has in one period of the stream.
+/// The most points that wait. A usual input has far fewer in one period of the stream.
 const POINTS_AHEAD: usize = 16_384;
 
 /// The points that are not sent yet, and the last one whose time has come.
@@ -43,7 +43,8 @@ impl Feed {
         self.last.map_or(next, |last| next.min(last.time + period))
     }
 
-    /// The set-point at this time; `None` if the input has no point yet, or no new one since the last point was returned.
+    /// The set-point at this time; `None` before the time of the first point, or if no new point has come since the last one was
+    /// returned.
     pub(super) fn take(&mut self, time: Duration) -> Option<FineTargets> {
         while let Some(point) = self.next.pop_front_if(|point| point.time <= time) {
             (self.last, self.is_last_taken) = (Some(point), false);

@@ -297,7 +297,7 @@ impl Streamer<'_, '_> {
     }
 
     /// Waits until the joints stand at the last points. Fails if a joint does not get there, or if the target of a joint
-    /// has changed: it has to be the last point of the joint, or the target at the start if the joint had no point.
+    /// has changed by more than 3 degrees: from the last point of the joint, or from the target at the start if it had no point.
     fn wait_until_arrived(&mut self, interrupt: Interrupt) -> Result<(), CommandError> {
         let Self { stream, tracking, .. } = self;
         stream.wait_until_arrived(|stream, end| take_reports_until(stream, tracking, end, interrupt))?;

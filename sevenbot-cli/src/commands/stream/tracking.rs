@@ -78,7 +78,7 @@ impl Tracking {
         }
     }
 
-    /// The error so far; `None` without a report.
+    /// The error so far; `None` before the first report for which it is known which pose was due.
     pub(super) fn error(&self) -> Option<TrackingError> {
         let (largest, joint) = self.largest;
         let rms = (self.squares / f64::from(self.count)).sqrt();

@@ -1,16 +1,17 @@
 //! The hub holds the arm by itself when the watchdog of a client acts ([D24](protocol_core::decisions#d24)), for a command to
-//! stop, and for a stop that comes too late.
+//! stop, and for a stop or a hold that comes too late or while the arm is silent. It also repeats a hold that an outage
+//! interrupted.
 //!
 //! ```text
-//!   read which joints are silent or move ──▶ none: the arm holds
+//!   read which joints are silent or move ──▶ none, and no stream: the arm holds
 //!     └─▶ read targets and positions ──▶ write the positions of these joints as targets ──▶ read again, until no target differs
 //!           └─▶ read the set-point period if it was changed, and then the motor state and the speeds, until these are restored
 //!               (`holding`)
 //! ```
 //!
-//! A joint that has reached its target keeps it ([D24](protocol_core::decisions#d24)). Its load draws it some tenths of a
-//! degree off its target: if its position became its target, it would sink by as much again in each hold. A joint that still
-//! brakes after a stop or a hold keeps its target, too ([`HeldTargets`]).
+//! If the arm tells which joints move, a joint that has reached its target keeps it ([D24](protocol_core::decisions#d24)). Its
+//! load draws it some tenths of a degree off its target: if its position became its target, it would sink by as much again in
+//! each hold. A joint that still brakes after a stop or a hold keeps its target, too ([`HeldTargets`]).
 
 use host_link::keep_limits;
 use protocol_core::registers::map::{
@@ -55,7 +56,7 @@ pub(crate) struct ArmHold {
     /// A joint whose set-point moves was not measured yet. It goes on moving once it is measured.
     has_unmeasured: bool,
     repeats: u8,
-    /// Replies so far.
+    /// Replies so far; while the hold restores, tries to restore the value.
     rounds: u8,
     sent: Vec<Frame>,
     /// Joints that a client held after the pending read was first sent, one bit each.

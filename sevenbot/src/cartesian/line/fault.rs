@@ -36,7 +36,7 @@ pub enum StraightLineFault {
         /// The necessary turn in degrees.
         degrees: f64,
     },
-    /// A joint would have to turn faster than 190 degrees/s, the largest value of its speed register (D10).
+    /// A joint would have to turn faster than 190 degrees/s, the largest speed below the maximum (D10).
     TooFast {
         /// The number of the joint, from 1.
         joint: u8,

@@ -26,7 +26,7 @@ pub(crate) use faults::{FAULTS, Fault};
 
 /// Virtual milliseconds after the end of a command, in which the arm completes the move that the command began.
 const AFTERWARDS: u64 = 3_000;
-/// The servos take this virtual time to start, in milliseconds.
+/// In this virtual time the servos have started, in milliseconds.
 const START_UP: u64 = 1_500;
 /// The number of frames that the arm receives before the command, as if it had been on for long. A command detects a
 /// restart by the counter of frames.

@@ -7,7 +7,7 @@ use system_tests::{Need, TestSetup, with_arm};
 
 const OFFSETS: [u8; 7] = [1, 2, 3, 0x84, 0x85, 6, 0x90];
 
-/// D19: settings are kept over a power cycle. All other registers start with their defaults.
+/// D19: settings are kept over a power cycle. The lock and the speeds start with their defaults.
 #[test]
 fn d19_only_settings_survive_a_power_cycle() {
     with_arm(TestSetup::any().needs(Need::PowerCycle).needs(Need::Persistence), |arm| {

@@ -16,7 +16,7 @@ const PING: u8 = 0x89;
 /// The first fragment of a text, one between, and the last.
 const FRAGMENTS: [u8; 3] = [0x01, 0x00, 0x80];
 
-/// A good client of each kind.
+/// Good clients on a pseudo-terminal, over TCP and over the WebSocket.
 struct Others {
     terminal: ArmClient,
     tcp: TcpStream,

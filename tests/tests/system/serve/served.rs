@@ -236,7 +236,7 @@ impl WebClient {
         self.0.get_ref().try_clone().expect("a second handle")
     }
 
-    /// The next message; `None` if the connection has ended, or the message is not JSON, such as a pong.
+    /// The next message; `None` if none comes in 30 s, the connection has ended, or the message is not JSON, such as a pong.
     pub(crate) fn receive(&mut self) -> Option<Value> {
         let message = self.0.read().ok()?;
         message.to_text().ok().and_then(|text| serde_json::from_str(text).ok())

@@ -136,7 +136,8 @@ impl FileAndModel {
 struct TableModel {
     /// Offsets are in sign and magnitude, whatever `offsets_in` says.
     values: [u8; 256],
-    /// The encoding in which a read shows the offsets: the map of the last write, or before it the map of register 20 (M5).
+    /// The encoding in which a read shows the offsets: the map of the last accepted write, or before it the map of register 20
+    /// (M5).
     offsets_in: Map,
 }
 

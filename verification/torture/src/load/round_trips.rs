@@ -28,7 +28,8 @@ impl RoundTrips {
         self.worst = self.worst.max(took);
     }
 
-    /// The time in milliseconds that this many thousandths of the round trips do not exceed; 0 without round trips.
+    /// The time in milliseconds that this many thousandths of the round trips do not exceed, rounded to a bucket, so at most a
+    /// second; 0 without round trips.
     fn quantile_ms(&self, thousandths: u64) -> f64 {
         let rank = self.counts.iter().sum::<u64>() * thousandths / 1_000;
         let mut seen = 0;

@@ -43,7 +43,8 @@ impl Fate {
     }
 }
 
-/// The largest fall and swing of any joint in some cases. `hold` counts the cases after which all joints have torque.
+/// The largest fall and swing of any joint in some cases. `hold` counts the cases after which all watched
+/// joints have torque.
 #[derive(Clone, Copy, Debug, Default)]
 struct Worst {
     cases: u32,

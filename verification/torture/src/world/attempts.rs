@@ -1,4 +1,5 @@
-//! Counts how often a joint is given torque. After three times in a minute it gets no torque until register 29 is written (D28).
+//! Counts how often a joint is given torque. A joint that was let go gets torque again at most three times in a minute, then not
+//! until register 29 is written (D28).
 
 use protocol_core::time::{Duration, Instant};
 

@@ -158,7 +158,7 @@ impl CommandChecker {
         (self.is_on[joint] && !self.is_released[joint]) || self.kept_goals[joint].is_some()
     }
 
-    /// True if the joint was given torque so often that only a write of register 29 gives it torque again (D28).
+    /// True if the joint was given torque so often that the controller may wait for a write of register 29 (D28).
     pub(super) fn is_exhausted(&self, joint: Joint) -> bool {
         self.attempts[joint].is_exhausted
     }

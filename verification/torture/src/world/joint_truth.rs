@@ -17,8 +17,8 @@ const ENGAGE_TIME: Duration = Duration::from_millis(10_000);
 const GIVE_WAY_TIME: Duration = Duration::from_millis(7_000);
 /// The largest error by which the controller measures a push too high, in 0.1 %: it samples speed and load at different times.
 const PUSH_ERROR: i16 = 150;
-/// A joint that was let go because of heat may engage again when its servo is 5 degrees cooler (D28) than the limit of the
-/// servo, 80 degrees Celsius.
+/// A joint that was let go because of heat may engage again when its servo is 5 degrees cooler than when it became too hot (D28).
+/// It became too hot above its limit, 80 degrees Celsius, so at this temperature it is cool enough.
 pub(super) const COOL: u8 = 75;
 
 /// The shortest time from the end of an alarm until its joint engages again: 500 ms (D28), less the delay of an answer.
@@ -28,8 +28,8 @@ const ALARM_OVER: Duration = Duration::from_millis(400);
 pub(super) struct JointTruth {
     is_on: bool,
     has_power: bool,
-    /// The last loss of power in the motor state servo. The joint of a servo that restarts is let go, even if it never had
-    /// torque (D28).
+    /// The last loss of power in the motor state servo, or the last time that an alarm switched the motor off. The joint of a servo
+    /// that restarts is let go, even if it never had torque (D28).
     unpowered_at: Option<Instant>,
     /// The last loss of torque in the motor state servo.
     lost_at: Option<Instant>,
@@ -43,7 +43,7 @@ pub(super) struct JointTruth {
     /// True if the servo has had no torque since a disturbance: the controller cannot tell a lost torque command from lost
     /// torque.
     lacks_order: bool,
-    /// The last push over the limit.
+    /// The last push that the controller may measure as over the limit.
     pushed_at: Option<Instant>,
     /// The position of the servo in counts, and the time of its last change.
     position: (u16, Instant),
@@ -70,8 +70,8 @@ impl JointTruth {
         self.passing_alarm_at.is_none_or(|at| now - at >= ALARM_OVER)
     }
 
-    /// Records the torque of the servo; `None` without power. `may_miss_orders` is true if frames may be lost or reads may stay
-    /// unanswered.
+    /// Records the torque of the servo; `None` without power, or while an alarm switches its motor off. `may_miss_orders` is true
+    /// if frames may be lost or reads may stay unanswered.
     pub(super) fn observe(&mut self, now: Instant, torque: Option<Torque>, may_miss_orders: bool) {
         let is_on = torque == Some(Torque::On);
         self.lacks_order = !is_on && (self.lacks_order || may_miss_orders);
@@ -80,7 +80,8 @@ impl JointTruth {
         }
         if std::mem::replace(&mut self.has_power, torque.is_some()) && torque.is_none() {
             self.unpowered_at = Some(now);
-            // A servo that restarts begins without an alarm, and its joint engages at once (D28).
+            // A servo that restarts begins without an alarm, and its joint engages at once (D28). If an alarm switched the motor
+            // off, the next answer shows it again.
             self.passing_alarm_at = None;
         }
         if !is_on {
@@ -126,7 +127,7 @@ impl JointTruth {
         has_alarm || self.lacks_order || had_cause && now - self.off_at < NOTICE_TIME
     }
 
-    /// True for [`GIVE_WAY_TIME`] after a push over the limit: the set-point may give way (D27).
+    /// True for [`GIVE_WAY_TIME`] after a push that may count as over the limit: the set-point may give way (D27).
     pub(super) fn may_give_way(&self, now: Instant) -> bool {
         self.pushed_at.is_some_and(|at| now - at < GIVE_WAY_TIME)
     }

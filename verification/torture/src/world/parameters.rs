@@ -18,7 +18,7 @@ pub(super) struct WorldParameters {
     goal_starts_torque: bool,
     /// The largest delay of a wake-up of the shell.
     pub(super) jitter: Duration,
-    /// True if the shell delivers host bytes before every poll, false if only before the first one.
+    /// True if the shell delivers host bytes before every poll, false if only before the first one and after a wait.
     pub(super) receives_before_every_poll: bool,
 }
 

@@ -1,5 +1,5 @@
-//! A model of the registers without measured values such as positions. Its rules come from docs/protocol.md, and its addresses,
-//! ranges and defaults from the register map.
+//! A model of the registers without measured values such as positions. Its rules come from docs/protocol.md, and most of its
+//! addresses, ranges and defaults from the register map; `map21_model` and `extended_model` have their own.
 
 mod comparison;
 pub(crate) mod limits;

@@ -39,7 +39,8 @@ struct Known {
     is_doubtful: bool,
     /// True if the servo was driven at the last read that followed an answered read.
     is_driven: bool,
-    /// True if its torque was read as on since it was last switched on or refreshed.
+    /// True if its torque was read as on since it was last switched on or refreshed. A later read that is unanswered or shows it
+    /// off clears this.
     is_read_on: bool,
     /// True if its torque was off when it was last read.
     is_read_off: bool,
@@ -175,7 +176,7 @@ impl ServoReplies {
         servo.is_driven = false;
     }
 
-    /// True if the torque was read as on since the last call.
+    /// True if the torque was read as on since the last call, and no later read was unanswered or showed it off.
     pub(super) fn take_read_on(&mut self, joint: Joint) -> bool {
         std::mem::take(&mut self.servos[joint].is_read_on)
     }

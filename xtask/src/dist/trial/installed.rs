@@ -97,7 +97,7 @@ pub(super) fn packages_are_flawless(release: &Release) -> TaskResult {
     Ok(())
 }
 
-/// Tries the wheel for this computer: in the Python of a bare system, and in each Python of this computer.
+/// Tries the wheel for this computer: in the Python of a bare system, and in each Python of this computer from [`OLDEST`] on.
 pub(super) fn wheels(release: &Release) -> TaskResult {
     let name = wheels::wheel(release, host_platform()?);
     let wheel = release.path(&name);

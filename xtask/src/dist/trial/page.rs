@@ -27,7 +27,7 @@ server.serve_forever()
 const PROGRAM: &str = r#"{"blocks": {"blocks": [{"type": "arm_start", "id": "a", "next": {"block":
     {"type": "arm_vacuum", "id": "b", "fields": {"STATE": "ON"}}}}]}}"#;
 const PYTHON: &str = "arm.set(\"vacuum-pump\", 1)";
-/// The page has drawn its seven joints when it contains this text at least seven times.
+/// The page has drawn its joints when it contains this text at least seven times. The slider of the time line counts, too.
 const SLIDER: &str = "type=\"range\"";
 const JOINTS: usize = 7;
 

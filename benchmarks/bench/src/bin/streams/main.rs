@@ -66,7 +66,7 @@ struct StreamFigures {
     delay: f64,
     /// How far the set-points go past the last point, in percent of the distance between two points.
     overshoot: f64,
-    /// Cycles without motion, in percent.
+    /// Cycles with less than 5 % of the velocity of the motion, in percent.
     stopped: f64,
 }
 

@@ -1,5 +1,5 @@
-//! Fifty programs connect, behave badly and disconnect, while the arm is unplugged again and again. No reply is lost or
-//! reaches another program, and no target is carried out late.
+//! Fifty programs connect, behave badly and disconnect, while the arm is unplugged: once by default, each minute in a longer
+//! run. No reply is lost or reaches another program, and no target is carried out late.
 //!
 //! ```text
 //!   Visitor ──▶ Wire: pseudo-terminal, Unix socket, TCP, WebSocket ──▶ server ──▶ relay ──▶ simulator

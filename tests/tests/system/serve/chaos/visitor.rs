@@ -84,7 +84,7 @@ impl Chaos {
         self.history.note(passing);
     }
 
-    /// The last frames on the arm's line.
+    /// How many reads and replies the arm's line carried of late, and the age of the last ones.
     pub(crate) fn line_of_late(&self) -> String {
         self.history.of_late()
     }
@@ -115,7 +115,7 @@ pub(super) struct ReplyWait<'a> {
     chaos: &'a Chaos,
     asked: (u8, u8),
     sent: Instant,
-    /// When the last bytes before the reply were received.
+    /// When bytes for an earlier program were last received; at first, when the wait began.
     quiet_since: Instant,
     outages: u64,
 }

@@ -207,7 +207,7 @@ impl WebWire {
         self.0.get_mut().write_all(bytes)
     }
 
-    /// The next text message; `None` if none arrives within [`RECEIVE_TIME`].
+    /// The next message; `None` if none arrives within [`RECEIVE_TIME`], or it is not text.
     pub(crate) fn receive(&mut self) -> io::Result<Option<String>> {
         match self.0.read() {
             Ok(Message::Text(text)) => Ok(Some(text.as_str().to_owned())),

@@ -35,7 +35,7 @@ pub(crate) enum Attack {
     NoFrames,
     /// Programs that set a watchdog and are silent for longer than its time.
     Watchdogs,
-    /// Connections that say nothing, speak HTTP, or guess the token.
+    /// Connections that say nothing, speak HTTP, guess the token, or begin a frame.
     Connections,
 }
 

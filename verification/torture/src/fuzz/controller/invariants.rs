@@ -30,7 +30,8 @@ const VALVE_TIME_US: u64 = 500_000;
 
 #[derive(Clone, Copy, Default)]
 struct JointGoal {
-    /// The last goal, its time in microseconds, and the number of polls at that time; `None` while the torque is off.
+    /// The last goal, its time in microseconds, and the number of polls at that time; `None` from start or torque-off until the
+    /// next goal, which comes before the torque.
     goal: Option<(u16, u64, u32)>,
     /// The highest speed limit since the last goal, in counts per cycle.
     max_speed: f64,

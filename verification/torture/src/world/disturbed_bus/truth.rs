@@ -38,7 +38,7 @@ impl DisturbedBus {
         &self.truths[joint]
     }
 
-    /// True if the servo has power and holds no torque.
+    /// True if the servo has power and its torque switch is not on.
     pub(crate) fn is_free(&self, joint: Joint) -> bool {
         matches!(self.plant.torque(joint), Some(torque) if torque != Torque::On)
     }

@@ -48,8 +48,8 @@ impl RegisterModel {
         limit_verdict::outcomes([of(limit::LINKAGE, &[two, three], linkage), of(limit::CLAW, &[seven], claw)])
     }
 
-    /// Finds which of the requests of a poll the arm refused against a limit, where the model cannot know it. Tries all
-    /// combinations, and keeps those that lead to the arm's registers.
+    /// Finds which of the requests of a poll the arm refused against a limit, where the model cannot know it. Tries the
+    /// combinations, at most [`MAX_TRIALS`], and keeps those that lead to the arm's registers.
     pub(crate) fn find_verdicts(
         &self,
         requests: &[&HostRequest],
