@@ -89,8 +89,7 @@ pub(crate) fn park(
     match (path, pose) {
         (Some(path), Some(pose)) if keep => Ok(park_poses::keep(&path, &chip, &pose).map(|()| parked)),
         (None, Some(_)) if keep => {
-            let reason =
-                "parked, but the pose is not kept: this user has no directory for settings; set HOME";
+            let reason = format!("parked, but the pose is not kept: {}", park_poses::NO_DIRECTORY);
             Ok(Err(io::Error::new(io::ErrorKind::NotFound, reason)))
         }
         _ => Ok(Ok(parked)),

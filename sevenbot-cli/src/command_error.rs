@@ -40,61 +40,34 @@ pub(crate) enum CommandError {
     /// The arguments are invalid, an answer from the user is missing, or this program was built without the page.
     Usage(String),
     /// No port was given, and none leads to an arm. `tried` holds each port with the reason.
-    NoArm {
-        tried: Vec<(String, OpenError)>,
-    },
+    NoArm { tried: Vec<(String, OpenError)> },
     /// No port was given, and several lead to an arm.
-    SeveralArms {
-        ports: Vec<String>,
-    },
+    SeveralArms { ports: Vec<String> },
     /// The port cannot be opened, or does not lead to an arm.
-    Open {
-        port: String,
-        error: OpenError,
-    },
+    Open { port: String, error: OpenError },
     /// The port opens, but no arm answers at any baud rate.
-    NoRate {
-        port: String,
-    },
+    NoRate { port: String },
     /// An exchange with the arm failed.
     Exchange(Error),
     /// An exchange with a servo failed.
-    Servo {
-        port: String,
-        error: ServoError,
-    },
+    Servo { port: String, error: ServoError },
     /// No servo answers at the rates and ids of the scan.
-    NoServo {
-        port: String,
-        has_echo: bool,
-    },
+    NoServo { port: String, has_echo: bool },
     /// The port leads to an arm's controller, not to servos.
-    HostLink {
-        port: String,
-    },
+    HostLink { port: String },
     /// A failure with advice of its own.
-    WithAdvice {
-        message: String,
-        advice: &'static [&'static str],
-    },
+    WithAdvice { message: String, advice: &'static [&'static str] },
     /// The simulator is not found, is not the only one, or does not answer.
     #[cfg(unix)]
-    NoSimulator {
-        message: String,
-        advice: Vec<String>,
-    },
+    NoSimulator { message: String, advice: Vec<String> },
+    /// The simulator refused the request.
     #[cfg(unix)]
-    SimulatorRefused {
-        message: String,
-        hint: String,
-    },
+    SimulatorRefused { message: String, hint: String },
     /// A file cannot be read or written, or has the wrong content.
-    File {
-        path: PathBuf,
-        reason: String,
-    },
+    File { path: PathBuf, reason: String },
     /// The output cannot be written.
     Output(io::Error),
+    /// The user interrupted the command.
     Interrupted,
 }
 

@@ -15,6 +15,13 @@ use crate::fine_angle::FineAngle;
 use crate::fine_state::FineTargets;
 use crate::whole_file;
 
+/// Why there is no place for the file, and what to do.
+pub const NO_DIRECTORY: &str = if cfg!(windows) {
+    "this user has no directory for settings: set APPDATA"
+} else {
+    "this user has no directory for settings: set HOME"
+};
+
 /// Where the file is; `None` if the user has no directory for settings.
 #[must_use]
 pub fn path() -> Option<PathBuf> {

@@ -14,7 +14,7 @@ static WRITING: Mutex<()> = Mutex::new(());
 /// a file whose folder takes no other file.
 ///
 /// # Errors
-/// The file cannot be written. If it was to be replaced, the old one is still there.
+/// The file cannot be written. The old one is still there, unless it is written directly.
 pub fn write(path: &Path, content: &[u8]) -> io::Result<()> {
     let place = match fs::canonicalize(path) {
         // The file, not a link to it, is replaced.

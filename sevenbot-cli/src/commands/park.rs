@@ -88,11 +88,7 @@ fn pose(arm: &Arm, args: &ParkArgs) -> Result<Option<FineTargets>, CommandError>
 }
 
 fn keep(arm: &Arm, pose: &FineTargets) -> Result<(), CommandError> {
-    let no_directory = || {
-        CommandError::Arm(
-            "parked, but not kept: this user has no directory for settings; set HOME".to_owned(),
-        )
-    };
+    let no_directory = || CommandError::Arm(format!("parked, but not kept: {}", park_poses::NO_DIRECTORY));
     let path = park_poses::path().ok_or_else(no_directory)?;
     park_poses::keep(&path, &arm.identity().chip_name(), pose)
         .map_err(|error| CommandError::file(&path, error))?;

@@ -157,8 +157,7 @@ impl McapFile {
         let (path, is_file, out): (_, _, Box<dyn Write>) = match output {
             McapOutput::Stdout(stdout) => (PathBuf::from("-"), false, Box::new(stdout)),
             McapOutput::File(file) => {
-                let path = file.path().to_owned();
-                (path.clone(), path.is_file(), Box::new(file.begin()?))
+                (file.path().to_owned(), file.path().is_file(), Box::new(file.begin()?))
             }
         };
         // A pipe is read while it is written, so it needs each message at once.
