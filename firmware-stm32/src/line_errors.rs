@@ -16,7 +16,7 @@ pub struct LineErrors {
 }
 
 impl LineErrors {
-    /// Counts of zero.
+    /// No errors yet.
     #[must_use]
     pub const fn new() -> Self {
         Self { overruns: 0, framing: 0, noise: 0 }

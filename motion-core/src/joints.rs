@@ -25,8 +25,8 @@ use crate::reach::Reached;
 use crate::servo_bus::{Answer, Question, Torque};
 use crate::supply_watch::SupplyWatch;
 
-/// A servo that restarts executes nothing for about 200 ms. So if the last answer of a servo is not older than this time,
-/// the servo has not restarted unnoticed.
+/// Shorter than the 200 ms or so for which a restarting servo executes nothing. So a servo that has answered within this
+/// time has not restarted since.
 const RESTART_TIME: Duration = Duration::from_millis(180);
 
 /// The seven joints and their motor state.

@@ -75,7 +75,7 @@ class Arm:
         return await self._call(lambda: self.sync.angles)
 
     async def is_connected(self) -> bool:
-        """As `sevenbot.Arm.is_connected`. Does not wait for the calls before."""
+        """As `sevenbot.Arm.is_connected`. Does not wait for an earlier call that waits for joints."""
         return await asyncio.to_thread(lambda: self.sync.is_connected)
 
     def registers(self) -> Awaitable[dict[str, Any]]:

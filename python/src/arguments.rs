@@ -222,7 +222,7 @@ impl OpenArguments<'_> {
     }
 }
 
-/// The baud rate of a port. Below 1,200 a program would wait for minutes for an answer.
+/// The baud rate of a port. The slowest rate of the arm is 9,600; below 1,200 a long answer takes seconds.
 pub(crate) fn baud_rate(py: Python<'_>, baud: i64) -> PyResult<u32> {
     whole(py, "baud", baud, 1_200, 4_000_000)
 }

@@ -38,7 +38,7 @@ pub(crate) struct Answer {
 }
 
 impl Answer {
-    /// Reads the arm; `None` if the firmware does not have these registers.
+    /// Reads positions, velocities and loads; `None` if the firmware does not have the extended block.
     pub(crate) fn read(arm: &mut Arm) -> Result<Option<Self>, Error> {
         let before = arm.elapsed();
         let Some(state) = arm.fine_state_if_served()? else { return Ok(None) };

@@ -17,7 +17,7 @@ Place = ast.ClassDef | ast.FunctionDef
 
 
 def docstring(found: object, indent: str) -> str | None:
-    """The lines of a docstring in the stubs."""
+    """The docstring of an object, as it stands in the stubs."""
     # For a static method itself, Python returns a text of its own, which differs between versions.
     text = inspect.getdoc(found.__func__ if isinstance(found, staticmethod) else found)
     if text is None:

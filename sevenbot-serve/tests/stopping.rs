@@ -58,7 +58,7 @@ fn farthest(targets: &[u8], positions: [i32; 7]) -> i32 {
     targets.zip(positions).map(|(target, position)| (target - position).abs()).max().unwrap()
 }
 
-/// What the other clients of the server do while the arm is stopped.
+/// What the other clients of the server do while the arm is told to stop.
 #[derive(Clone, Copy, Debug)]
 enum Attack {
     Nothing,

@@ -17,7 +17,7 @@ pub(crate) struct TestArgs {
     /// Run the quick steps only: format, lints, unit and property tests, and the system tests on the simulator
     #[arg(long)]
     quick: bool,
-    /// Run the long steps too: more torture and fuzzing, the long form of the settings' tests, and the model in MuJoCo
+    /// Run the long steps too, such as more torture and fuzzing, the model in MuJoCo, whole releases, Ray and LeRobot
     #[arg(long, conflicts_with = "quick")]
     long: bool,
     /// Do the work of one step: how the run itself starts it

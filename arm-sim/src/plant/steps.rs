@@ -72,7 +72,7 @@ impl Plant {
         self.now = self.now + Duration::from_micros(STEP.as_micros() * steps);
     }
 
-    /// Loads each servo with its share of the arm's weight and inertia in this pose.
+    /// Loads each servo with its share of the arm's weight and inertia in the present pose.
     pub(super) fn update_weight(&mut self) {
         self.rest_until = self.now;
         let load_g = self.load_grams();

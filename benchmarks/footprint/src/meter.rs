@@ -9,7 +9,7 @@ type RegisterAddress = *mut u32;
 
 /// TIM2 (RM0090, section 18.4): control register.
 const TIM2_CR1: RegisterAddress = 0x4000_0000 as RegisterAddress;
-/// TIM2: count.
+/// TIM2: the counter.
 const TIM2_CNT: RegisterAddress = 0x4000_0024 as RegisterAddress;
 /// USART1 (RM0090, section 30.6): data register.
 const USART1_DR: RegisterAddress = 0x4001_1004 as RegisterAddress;

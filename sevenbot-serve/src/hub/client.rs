@@ -187,7 +187,7 @@ impl Client {
         self.drop_where(|waiting| waiting.intent.is_ended_by_stop())
     }
 
-    /// Drops the requests that have waited too long. Returns whether there were any.
+    /// Drops the requests to move or switch the arm that have waited for `LONGEST_WAIT`. Returns whether there were any.
     pub(crate) fn drop_stale(&mut self, now: Instant) -> bool {
         self.drop_where(|waiting| waiting.intent.must_be_fresh() && now - waiting.since >= LONGEST_WAIT)
     }

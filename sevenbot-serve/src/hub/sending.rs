@@ -59,7 +59,7 @@ impl Hub {
         self.shares.floor(waiting.map(|client| client.share))
     }
 
-    /// Drops the requests that waited too long.
+    /// Drops the requests to move or switch the arm that have waited for `LONGEST_WAIT`.
     fn drop_stale(&mut self, now: Instant) {
         for (&id, client) in &mut self.clients {
             if client.drop_stale(now) {

@@ -1,4 +1,4 @@
-//! Fair use of the line: start-time fair queueing, counted in bytes.
+//! Fair use of the line: fair queueing by finish times, counted in bytes.
 //!
 //! Each client has a tag: the bytes up to which it has used the line. The request that would end at the lowest tag is next, so
 //! a short one does not wait for long ones that could begin at the same tag. A client that was idle starts at the lowest tag of

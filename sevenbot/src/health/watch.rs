@@ -356,7 +356,7 @@ mod tests {
         let mut watch = MoveWatch::new(ms(0), 1, 115_200);
         assert_eq!(watch.registers(ms(10), &frames(0)), Ok(()));
         assert_eq!(watch.registers(ms(60_000), &frames(33_000)), Ok(()), "the line can carry 98,000");
-        // This answer may have come long before it was taken.
+        // The answer taken at 60 s may have come earlier, so these 17,000 frames may have taken more than 0.1 s.
         assert_eq!(watch.registers(ms(60_100), &frames(50_000)), Ok(()));
         assert!(watch.registers(ms(60_200), &frames(50)).is_err(), "15,586 frames in 0.2 s");
         let mut wrapping = MoveWatch::new(ms(0), 1, 115_200);

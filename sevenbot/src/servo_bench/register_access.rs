@@ -1,4 +1,4 @@
-//! Reads and writes the registers of a servo by name, with a check of the range and of the result.
+//! Reads and writes the registers of a servo. A write checks the range, and the result by a read.
 
 use motion_core::servo_bus::frame::{BAUD_RATES, register};
 

@@ -23,7 +23,7 @@ pub const SET_VELOCITIES: Range<usize> = 7..14;
 /// 1: the motor drives the joint. 2: the motor damps the joint. 0: neither.
 pub const DRIVES: Range<usize> = 14..21;
 
-/// Fails at the first measurement that is not a number or too large. Ignores joints whose position is NaN.
+/// Skips the joints whose position is NaN. Fails at the first measurement of another joint that is no number or too large.
 pub(super) fn check<T: Number>(measured: &[T]) -> Result<(), StepError> {
     for (arm, row) in measured.chunks(MEASURED).enumerate() {
         for joint in 1..=JOINTS {

@@ -1,5 +1,5 @@
-//! Arms that step together: the same numbers on any number of threads and as frames on a single arm, wrong calls, resets, and
-//! lost replies.
+//! Arms that step together: the number of threads changes nothing, and each arm does what an arm alone does with the same
+//! frames. Also wrong calls, resets, and lost replies.
 
 use arm_sim::request::Request;
 use protocol_core::registers::map::{FINE_POSITION, FINE_TARGET, SET_POINT_PERIOD};

@@ -45,8 +45,8 @@ impl LoggedImage {
         Ok(image)
     }
 
-    /// Starts the image without servos. Virtual time does not wait for real time, so every run executes the same
-    /// instructions.
+    /// Starts the image without servos. Virtual time does not wait for real time, so until a host sends, every run
+    /// executes the same instructions.
     pub fn alone() -> TaskResult<Self> {
         Self::start(tempfile::tempdir()?, None, "null", "shift=0,sleep=off")
     }

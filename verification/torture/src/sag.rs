@@ -222,7 +222,7 @@ fn worst_cell(sag: &Sag) -> String {
     }
 }
 
-/// Degrees with two decimals, rounded up, so that no motion is shown as 0.
+/// Degrees with two decimals, rounded up, so that a small motion is not shown as 0.
 fn degrees(millidegrees: u32) -> String {
     let hundredths = millidegrees.div_ceil(10);
     format!("{}.{:02}", hundredths / 100, hundredths % 100)

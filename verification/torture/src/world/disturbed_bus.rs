@@ -69,7 +69,6 @@ pub(super) struct DisturbedBus {
     truths: PerJoint<JointTruth>,
     /// A hand pushes the joint.
     has_push: PerJoint<bool>,
-    /// A wall is in the way of the joint.
     has_wall: PerJoint<bool>,
     has_thing: bool,
     push_rules: PerJoint<PushRule>,

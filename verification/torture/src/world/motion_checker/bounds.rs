@@ -66,7 +66,7 @@ pub(super) struct JointBounds {
     /// The last goal that its servo has received, in millidegrees. `None` from the start of an exemption other than an alarm until
     /// the next goal.
     pub(super) goal: Option<i32>,
-    /// True if its servo had no power, and has received no goal since then.
+    /// True if its servo was seen without power, and has received no goal and got no other exemption since then.
     pub(super) awaits_goal: bool,
     /// The goals of the present period of 100 ms, and of the period before.
     pub(super) goals: [AngleRange; 2],
