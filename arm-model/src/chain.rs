@@ -30,23 +30,23 @@ pub(crate) const MAX_SPEED: f64 = 6.49;
 
 /// A cylinder that represents a part, in metres.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Solid {
+pub(crate) struct LinkCylinder {
     pub(crate) from: Axes,
     pub(crate) to: Axes,
     pub(crate) radius: f64,
 }
 
-const fn solid(from: Axes, to: Axes, radius: f64) -> Solid {
+const fn solid(from: Axes, to: Axes, radius: f64) -> LinkCylinder {
     let [x, y, z] = from;
     let [u, v, w] = to;
-    Solid { from: [m(x), m(y), m(z)], to: [m(u), m(v), m(w)], radius: m(radius) }
+    LinkCylinder { from: [m(x), m(y), m(z)], to: [m(u), m(v), m(w)], radius: m(radius) }
 }
 
 /// A link, its shape, and the joint that carries it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Link {
     pub(crate) name: &'static str,
-    pub(crate) solids: &'static [Solid],
+    pub(crate) solids: &'static [LinkCylinder],
     /// `None` for the base.
     pub(crate) joint: Option<ModelJoint>,
 }
@@ -103,21 +103,21 @@ const WRIST: Axes = [FOREARM, 0.0, ELBOW_OFFSET];
 const DISC: Axes = [TOOL, 0.0, 0.0];
 
 // Lengths and radii that are plain numbers here are estimates.
-pub(crate) const BASE_SOLIDS: &[Solid] = &[solid([0.0, 0.0, -BASE_HEIGHT], [0.0, 0.0, 0.0], 65.0)];
-pub(crate) const TURRET_SOLIDS: &[Solid] = &[
+pub(crate) const BASE_SOLIDS: &[LinkCylinder] = &[solid([0.0, 0.0, -BASE_HEIGHT], [0.0, 0.0, 0.0], 65.0)];
+pub(crate) const TURRET_SOLIDS: &[LinkCylinder] = &[
     solid(ORIGIN, [0.0, 0.0, SHOULDER_HEIGHT - 15.0], 45.0),
     solid([SHOULDER_FORWARD, -35.0, SHOULDER_HEIGHT], [SHOULDER_FORWARD, 35.0, SHOULDER_HEIGHT], 20.0),
 ];
-pub(crate) const REAR_ARM_SOLIDS: &[Solid] = &[solid(ORIGIN, ELBOW, 14.0)];
-pub(crate) const FOREARM_SOLIDS: &[Solid] = &[
+pub(crate) const REAR_ARM_SOLIDS: &[LinkCylinder] = &[solid(ORIGIN, ELBOW, 14.0)];
+pub(crate) const FOREARM_SOLIDS: &[LinkCylinder] = &[
     solid([0.0, -20.0, 0.0], [0.0, 20.0, 0.0], 16.0),
     solid(ORIGIN, [0.0, 0.0, ELBOW_OFFSET], 14.0),
     solid([0.0, 0.0, ELBOW_OFFSET], WRIST, 14.0),
 ];
-pub(crate) const WRIST_SOLIDS: &[Solid] = &[solid([0.0, -16.0, 0.0], [0.0, 16.0, 0.0], 12.0)];
-pub(crate) const HAND_SOLIDS: &[Solid] = &[solid(ORIGIN, [TOOL - 5.0, 0.0, 0.0], 10.0)];
+pub(crate) const WRIST_SOLIDS: &[LinkCylinder] = &[solid([0.0, -16.0, 0.0], [0.0, 16.0, 0.0], 12.0)];
+pub(crate) const HAND_SOLIDS: &[LinkCylinder] = &[solid(ORIGIN, [TOOL - 5.0, 0.0, 0.0], 10.0)];
 /// The disc, and a pin at the edge of the disc, on its y axis. The pin shows how joint 6 turns the disc.
-pub(crate) const DISC_SOLIDS: &[Solid] = &[
+pub(crate) const DISC_SOLIDS: &[LinkCylinder] = &[
     solid([-5.0, 0.0, 0.0], ORIGIN, DISC_RADIUS),
     solid([-5.0, DISC_RADIUS - 2.0, 0.0], [2.0, DISC_RADIUS - 2.0, 0.0], 2.0),
 ];

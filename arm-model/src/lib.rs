@@ -8,9 +8,10 @@
 //!                   └──▶ look: meshes of the bodies; pose: where they are, for programs that draw the arm
 //! ```
 //!
-//! Lengths are metres and angles radians, axes as in REP-103: x forward, y to the left, z up. All angles of the joints
-//! are 0 in the straight pose: the arm forward, the rear arm upright, forearm and hand level. In this pose all links have the
-//! axes of the base. [`joint_angles`] converts the degrees of the registers.
+//! Lengths are metres and angles radians, axes as in REP-103: x forward, y to the left, z up. But meshes of [`Body`] are in
+//! millimetres, and [`poses`] has the units and the frame of [`kinematics`]. All angles of the joints are 0 in the straight pose:
+//! the arm forward, the rear arm upright, forearm and hand level. In this pose all links have the axes of the base.
+//! [`joint_angles`] converts the degrees of the registers.
 //!
 //! Shapes of URDF and MJCF are cylinders along the axes of the parts; shapes of glTF are meshes as in [`Body`]. Dimensions of
 //! shapes that [`kinematics::geometry`] does not define are estimates. The three models leave out joint 7, the claw, which

@@ -8,7 +8,7 @@
 //! ```
 //!
 //! Joint 2 turns the rear arm and joint 3 the lever, both about the shoulder. The joints of the elbow and the rod are passive.
-//! Masses and servos are the same as in the simulator, [`arm_sim::parameters`].
+//! Masses and the values of the servos come from the simulator, [`arm_sim::parameters`].
 
 use std::io;
 
@@ -25,7 +25,7 @@ use kinematics::geometry::{
 use crate::ABOUT;
 use crate::chain::{
     Axes, BACK, BASE_SOLIDS, DISC_SOLIDS, FOREARM_SOLIDS, HAND_SOLIDS, JOINT_3_HIGH, JOINT_3_LOW, LEFT,
-    REAR_ARM_SOLIDS, RIGHT, Solid, TURRET_SOLIDS, UP, WRIST_SOLIDS, m,
+    LinkCylinder, REAR_ARM_SOLIDS, RIGHT, TURRET_SOLIDS, UP, WRIST_SOLIDS, m,
 };
 use crate::xml::{XmlDocument, number, triple};
 use crate::{JOINT_NAMES, TIP};
@@ -162,7 +162,7 @@ fn rear_arm(out: &mut XmlDocument, shoulder: Axes) -> io::Result<()> {
     body(out, "rear_arm", shoulder, REAR_ARM_SOLIDS)?;
     mass(out, thousandths(REAR_ARM_G), [0.0, 0.0, thousandths(REAR_ARM_CENTRE_MM)])?;
     hinge(out, "joint_2", RIGHT, QUARTER)?;
-    let behind = Solid { from: ORIGIN, to: LEVER_END, radius: RADIUS };
+    let behind = LinkCylinder { from: ORIGIN, to: LEVER_END, radius: RADIUS };
     let solids = [FOREARM_SOLIDS, &[behind]].concat();
     body(out, "forearm", [0.0, 0.0, m(REAR_ARM)], &solids)?;
     mass(out, thousandths(FOREARM_G), [thousandths(FOREARM_CENTRE_MM), 0.0, m(ELBOW_OFFSET)])?;
@@ -186,10 +186,10 @@ fn rear_arm(out: &mut XmlDocument, shoulder: Axes) -> io::Result<()> {
 }
 
 fn lever(out: &mut XmlDocument, shoulder: Axes) -> io::Result<()> {
-    body(out, "lever", shoulder, &[Solid { from: ORIGIN, to: LEVER_END, radius: RADIUS }])?;
+    body(out, "lever", shoulder, &[LinkCylinder { from: ORIGIN, to: LEVER_END, radius: RADIUS }])?;
     mass(out, LIGHT, ORIGIN)?;
     hinge(out, "joint_3", LEFT, [JOINT_3_LOW, JOINT_3_HIGH])?;
-    let rod = Solid { from: ORIGIN, to: [0.0, 0.0, m(REAR_ARM)], radius: RADIUS };
+    let rod = LinkCylinder { from: ORIGIN, to: [0.0, 0.0, m(REAR_ARM)], radius: RADIUS };
     body(out, "rod", LEVER_END, &[rod])?;
     mass(out, LIGHT, ORIGIN)?;
     out.empty("joint", &[text("name", "rod_joint"), text("type", "hinge"), ("axis", triple(LEFT))])?;
@@ -198,9 +198,9 @@ fn lever(out: &mut XmlDocument, shoulder: Axes) -> io::Result<()> {
 }
 
 /// Begins a body with its shapes.
-fn body(out: &mut XmlDocument, name: &str, position: Axes, solids: &[Solid]) -> io::Result<()> {
+fn body(out: &mut XmlDocument, name: &str, position: Axes, solids: &[LinkCylinder]) -> io::Result<()> {
     out.begin("body", &[text("name", name), ("pos", triple(position))])?;
-    for Solid { from, to, radius } in solids {
+    for LinkCylinder { from, to, radius } in solids {
         let ends = format!("{} {}", triple(*from), triple(*to));
         out.empty("geom", &[("fromto", ends), ("size", number(*radius))])?;
     }

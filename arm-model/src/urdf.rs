@@ -3,7 +3,7 @@
 use std::io;
 
 use crate::ABOUT;
-use crate::chain::{Axes, LINKS, Link, MAX_SPEED, ModelJoint, Motion, Solid};
+use crate::chain::{Axes, LINKS, Link, LinkCylinder, MAX_SPEED, ModelJoint, Motion};
 use crate::xml::{XmlDocument, number, triple};
 
 /// The torque limit, which URDF requires, in Nm. Assumed: the stall torque of the servos is not measured.
@@ -58,7 +58,7 @@ fn write_link(out: &mut XmlDocument, link: &Link) -> io::Result<()> {
 }
 
 /// Writes a cylinder. In URDF its axis is z, so a rotation turns it to the axis of the solid.
-fn write_solid(out: &mut XmlDocument, solid: &Solid) -> io::Result<()> {
+fn write_solid(out: &mut XmlDocument, solid: &LinkCylinder) -> io::Result<()> {
     let [x, y, z] = between(solid.from, solid.to, |from, to| to - from);
     let middle = between(solid.from, solid.to, |from, to| (from + to) / 2.0);
     let length = x.hypot(y).hypot(z);

@@ -41,7 +41,7 @@ pub enum Action {
     /// `drop`: the tool drops everything. The weight disappears, and so does a thing between the claws. An object of the scene
     /// falls.
     Drop,
-    /// `trip 2` latches an overload of a joint's servo; `trip 2 heat` makes the servo too hot.
+    /// `trip 2` latches an overload of a joint's servo that has torque; `trip 2 heat` makes the servo too hot.
     Trip(Joint, Trip),
     /// `scene cube red 30 40 0 220; table -60`: what stands on the table ([`Scene`]). `scene off` removes the table, too.
     Scene(Option<Scene>),

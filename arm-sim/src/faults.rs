@@ -251,14 +251,14 @@ impl ArmFault {
 pub struct FaultReport {
     /// The fault. Its text is that of a command line, such as `3=missing`.
     pub fault: ArmFault,
-    /// When it ends by itself. `None`: it stays until it is removed.
+    /// When its duration is over. `None`: it has none.
     pub until: Option<Instant>,
     /// How often it took effect. `None` if its effects are not counted.
     pub count: Option<FaultCount>,
 }
 
 impl FaultReport {
-    /// The time until it ends by itself. `None`: it stays until it is removed.
+    /// The time until its duration is over. `None`: it has none.
     #[must_use]
     pub fn remaining(&self, now: Instant) -> Option<Duration> {
         self.until.map(|until| until - now)

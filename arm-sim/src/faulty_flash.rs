@@ -13,7 +13,8 @@ use crate::fault_count::FaultCount;
 pub enum FlashFault {
     /// The flash refuses every write and erase.
     Fails,
-    /// The journal has no room: the arm refuses writes that change a setting ([D19](protocol_core::decisions#d19)).
+    /// The journal has no room: this project's controller refuses writes that change a setting
+    /// ([D19](protocol_core::decisions#d19)).
     Full,
 }
 

@@ -17,7 +17,7 @@ pub const CAPACITY: usize = 2 * MAX_LENGTH;
 /// Start bit, eight data bits, stop bit.
 const BITS_PER_BYTE: u64 = 10;
 /// [`Pacer::deadline`] waits for a batch: as many bytes as the line carries in this time, in microseconds. A wake-up for each
-/// byte would take more time than the byte, and serial adapters do not deliver single bytes either.
+/// byte would take much processor time, and serial adapters deliver bytes in batches, too.
 const BATCH_MICROS: u64 = 1_000;
 
 /// One direction of a serial line.
@@ -91,7 +91,6 @@ impl Pacer {
 
     /// Marks the bytes that have arrived by `now`.
     pub fn advance(&mut self, now: Instant) {
-        // Each event of the arm calls this, and the host line is mostly idle.
         if self.in_transit() == 0 {
             return;
         }

@@ -34,7 +34,7 @@
 //! | --- | --- | --- |
 //! | base axis to shoulder, shoulder to elbow, elbow to forearm, forearm to joint 5 | 29, 120, 25, 198.5 mm | the maker's constants d, a, h and c |
 //! | rear arm: mass, centre from the shoulder | 120 g, 60 mm | assumed |
-//! | forearm with the servos of joints 4 and 5: mass, centre from the elbow | 200 g, 110 mm | assumed |
+//! | forearm with the servos of joints 4 and 5: mass, centre from the elbow along its axis | 200 g, 110 mm | assumed |
 //! | tool: mass, centre from joint 5 | 100 g, 50 mm | assumed |
 //! | grip: distance from joint 5 | 90 mm | assumed |
 
@@ -145,7 +145,7 @@ pub(crate) const SHOULDER_FORWARD_MM: i64 = 29;
 pub(crate) const REAR_ARM_MM: i64 = 120;
 /// Elbow pin to the axis of the forearm, at a right angle, in millimetres (the maker's length h).
 pub(crate) const ELBOW_OFFSET_MM: i64 = 25;
-/// Elbow to joint 5, in hundredths of a millimetre (the maker's length c).
+/// Along the axis of the forearm to joint 5, in hundredths of a millimetre (the maker's length c).
 pub(crate) const FOREARM_CENTI_MM: i64 = 19_850;
 /// Mass of the rear arm, in grams.
 pub const REAR_ARM_G: i64 = 120;
@@ -153,7 +153,7 @@ pub const REAR_ARM_G: i64 = 120;
 pub const REAR_ARM_CENTRE_MM: i64 = 60;
 /// Mass of the forearm with the servos of joints 4 and 5, in grams.
 pub const FOREARM_G: i64 = 200;
-/// Distance of the forearm's centre of mass from the elbow, in millimetres.
+/// Distance of the forearm's centre of mass from the elbow along the forearm, in millimetres.
 pub const FOREARM_CENTRE_MM: i64 = 110;
 /// Mass of the tool (the servos of joints 6 and 7, and the claw or the cup), in grams.
 pub const TOOL_G: i64 = 100;

@@ -140,7 +140,8 @@ impl Plant {
         self.wire.baud()
     }
 
-    /// Takes bytes that the controller starts to send at `now`. The servos do not receive them if a servo still drives the line.
+    /// Takes bytes that the controller sends from `now` on, or after its earlier bytes. The servos do not receive them if a servo
+    /// drives the line meanwhile, unless [`Plant::ignore_collisions`] was called.
     pub fn bytes(&mut self, now: Instant, bytes: &[u8]) {
         self.advance(now);
         if bytes.is_empty() {
@@ -202,7 +203,7 @@ impl Plant {
     }
 
     /// When the last byte of the next answer or echo arrives; `None` if there is none. The motors need no calls at certain times:
-    /// each call simulates the time since the call before.
+    /// each call simulates the time since the call before, up to 100 s of it.
     #[must_use]
     pub fn deadline(&self) -> Option<Instant> {
         self.wire.deadline()

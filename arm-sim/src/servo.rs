@@ -74,7 +74,7 @@ pub struct Servo {
     push_count: FaultCount,
     /// The reported values of the last step that changed the servo. `None`: no step did so since the start.
     reported: Option<Reported>,
-    /// The registers hold the measurements of an earlier step. They are updated when a frame comes.
+    /// The registers hold the measurements of an earlier step: [`Servo::update_reading`] updates them.
     is_reading_old: bool,
 }
 
@@ -184,8 +184,8 @@ impl Servo {
         answer.map(|mut bytes| ServoAnswer { delay: self.fault.inject(&mut bytes), bytes })
     }
 
-    /// Does a frame have no effect on the next steps? True for a question, and for values that a servo with torque already
-    /// holds.
+    /// Does a frame have no effect on the next steps? True for a question, and for a sync write of values that a servo with torque
+    /// already holds.
     pub(crate) fn is_unchanged_by(&self, frame: &ServoFrame<'_>) -> bool {
         let holds_values = || self.registers.holds(frame) && self.motor.is_started(self.registers.goal());
         self.is_on == self.is_switched_on()

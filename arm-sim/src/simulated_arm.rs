@@ -40,7 +40,7 @@ mod power;
 mod record;
 mod snapshot;
 
-/// How long the controller waits for a servo's answer.
+/// How long the controller waits for a servo's answer, without the delay of a USB adapter.
 const SERVO_TIMEOUT: Duration = Duration::from_millis(5);
 /// The pause of the controller before each frame on the servo bus, as on the reference board.
 const GUARD_TIME: Duration = Duration::from_micros(100);
@@ -215,7 +215,7 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
     }
 
     /// The first bytes that have arrived at the host, possibly not all of them. They fill the line until
-    /// [`SimulatedArm::host_take`], and the arm holds back answers while the line is full
+    /// [`SimulatedArm::host_take`], and the arm holds back an answer for which the line has no room
     /// ([D5](protocol_core::decisions#d5)).
     #[must_use]
     pub fn host_received(&self) -> &[u8] {

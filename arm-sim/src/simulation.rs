@@ -119,7 +119,7 @@ impl<C: ArmController> Simulation<C> {
         Self { arm, now: Instant::ZERO, to_send: VecDeque::new(), received: Vec::new(), planned: Vec::new() }
     }
 
-    /// The virtual time since power-up.
+    /// The virtual time since [`Simulation::power_up`].
     #[must_use]
     pub const fn now(&self) -> Instant {
         self.now
@@ -263,7 +263,7 @@ impl<C: ArmController> Simulation<C> {
         self.arm.power_off(self.now);
     }
 
-    /// Adds a fault, for `duration` or until [`Simulation::end_faults`]. Returns the report of the fault that it replaces.
+    /// Adds a fault, for `duration` or until it is removed. Returns the report of the fault that it replaces.
     ///
     /// ```
     /// use arm_sim::{Duration, Simulation};

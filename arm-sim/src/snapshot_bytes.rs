@@ -30,7 +30,7 @@ pub enum SnapshotError {
     /// Bytes are missing, changed or added.
     #[error("the snapshot is damaged")]
     Damaged,
-    /// The bytes were made by another version, which has other types.
+    /// The bytes were made by another version, which can have other types.
     #[error("the snapshot was made by version {made_by}, and this is version {VERSION}: take a new one")]
     OtherVersion {
         /// The version that made the bytes.

@@ -46,7 +46,8 @@ mod stop_all;
 
 pub use connection::ConnectionId;
 pub use message::{
-    Doing, FromPupil, FromTeacher, Goals, LeaseEnd, LentArm, Report, StopOutcome, ToPupil, ToTeacher,
+    Doing, ExerciseProgress, FromPupil, FromTeacher, LeaseEnd, LentArm, StopOutcome, TabReport, ToPupil,
+    ToTeacher,
 };
 pub use real_arm::ArmNews;
 pub use room::{ClassInfo, Classroom, LeaseId, MOST_PUPILS};

@@ -3,7 +3,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// The number of points of the arm in a [`Report`]: shoulder, elbow, start of the forearm, wrist, tip.
+/// The number of points of the arm in a [`TabReport`]: shoulder, elbow, start of the forearm, wrist, tip.
 pub const POINTS: usize = 5;
 /// The longest message of the teacher to all, in characters.
 pub const LONGEST_TEXT: usize = 280;
@@ -20,7 +20,7 @@ pub enum FromPupil {
         key: Option<String>,
     },
     /// The answer to [`ToPupil::Ask`].
-    Report(Report),
+    Report(TabReport),
     /// The answer to [`ToPupil::Stop`], once the arm of the tab has confirmed it.
     Stopped {
         /// The number in [`ToPupil::Stop`].
@@ -43,13 +43,13 @@ impl FromPupil {
 
 /// What the arm of a tab does.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Report {
+pub struct TabReport {
     /// x, y, z in mm, see [`POINTS`]; `None` while the arm is not measured.
     pub points: Option<[[i16; 3]; POINTS]>,
     /// What it does, for the teacher's screen.
     pub doing: Doing,
     /// The goals of the exercise in progress; `None` without an exercise.
-    pub goals: Option<Goals>,
+    pub goals: Option<ExerciseProgress>,
     /// True if the tab is in the background, where a simulated arm stands still.
     pub is_hidden: bool,
 }
@@ -86,7 +86,7 @@ pub enum Doing {
 
 /// The progress in an exercise.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Goals {
+pub struct ExerciseProgress {
     /// The number of goals that are reached.
     pub reached: u8,
     /// The number of goals that the exercise has.
@@ -131,7 +131,7 @@ pub enum ToPupil {
     Ask {
         /// The lease of the real arm; `None` if no pupil has it.
         arm: Option<LentArm>,
-        /// Why this tab no longer has the real arm; `None` unless its lease has ended since the last question.
+        /// Why the lease of this tab ended; `None` unless it has ended since the last question.
         over: Option<LeaseEnd>,
     },
 }
@@ -144,7 +144,7 @@ pub enum Refusal {
     NoName,
     /// [`MOST_PUPILS`](crate::MOST_PUPILS) tabs are connected already.
     Full,
-    /// The same pupil has joined in another tab.
+    /// The same pupil has joined over a newer connection, for example in another tab.
     OtherTab,
     /// A message was not valid, or the tab did not join within 10 s.
     BadMessage,
@@ -161,7 +161,7 @@ pub struct LentArm {
     pub is_yours: bool,
 }
 
-/// Why a pupil no longer has the real arm.
+/// Why the lease of a pupil ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LeaseEnd {
@@ -169,7 +169,7 @@ pub enum LeaseEnd {
     Time,
     /// The teacher took it back, or began a new lease.
     TakenBack,
-    /// The connection of the tab was lost, the tab did not answer for 8 s, or the pupil joined in another tab.
+    /// The connection of the tab ended, the tab did not answer for 8 s, or the pupil joined over a newer connection.
     Lost,
 }
 
@@ -251,9 +251,9 @@ pub struct Tile {
     /// The name of the pupil. Show it as text, not as HTML.
     pub name: String,
     /// Is the tab connected, and does it answer?
-    pub presence: Presence,
+    pub presence: TabPresence,
     /// The last report of the tab; `None` before the first.
-    pub report: Option<Report>,
+    pub report: Option<TabReport>,
     /// The state of the last stop for all in this tab; `None` if the tab was not asked.
     pub stop: Option<TileStop>,
 }
@@ -261,8 +261,8 @@ pub struct Tile {
 /// Whether a tab is connected and answers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Presence {
-    /// It answers.
+pub enum TabPresence {
+    /// It is connected, and has joined or answered within the last 8 s.
     Here,
     /// It is connected, and has not answered for 8 s.
     Silent,
@@ -276,9 +276,9 @@ pub enum Presence {
 pub enum TileStop {
     /// The stop is not confirmed yet.
     Asked,
-    /// The stop is confirmed, and the arm holds its position.
+    /// The stop is confirmed: the motors were on, and the arm held its position.
     Holds,
-    /// The motors are off or damped.
+    /// The stop is confirmed: the motors were off or damped.
     Limp,
 }
 

@@ -3,10 +3,10 @@
 use protocol_core::time::{Duration, Instant};
 
 use crate::connection::ConnectionId;
-use crate::message::{LeaseEnd, LentArm, Presence, Report, StopOutcome, Tile, ToPupil};
+use crate::message::{LeaseEnd, LentArm, StopOutcome, TabPresence, TabReport, Tile, ToPupil};
 use crate::stop_all::PendingStop;
 
-/// Time between two questions to a tab that answers. A change of the lease asks at once.
+/// The shortest time between two questions to a tab. A change of the lease asks at once.
 const ASK_PERIOD: Duration = Duration::from_millis(250);
 /// A tab that does not answer is asked again after this time. The tab takes a silence of 10 s for a dead connection.
 const ASK_AGAIN: Duration = Duration::from_millis(4_000);
@@ -21,7 +21,7 @@ pub(crate) struct Pupil {
     pub(crate) connection: Option<ConnectionId>,
     lost: Instant,
     is_welcome_due: bool,
-    report: Option<Report>,
+    report: Option<TabReport>,
     /// When the tab was asked last.
     asked: Instant,
     /// When the tab answered last, or joined.
@@ -82,11 +82,11 @@ impl Pupil {
         self.connection.is_none().then(|| now - self.lost)
     }
 
-    pub(crate) fn presence(&self, now: Instant) -> Presence {
+    pub(crate) fn presence(&self, now: Instant) -> TabPresence {
         match self.connection {
-            None => Presence::Lost,
-            Some(_) if now - self.answered >= SILENT => Presence::Silent,
-            Some(_) => Presence::Here,
+            None => TabPresence::Lost,
+            Some(_) if now - self.answered >= SILENT => TabPresence::Silent,
+            Some(_) => TabPresence::Here,
         }
     }
 
@@ -95,12 +95,12 @@ impl Pupil {
         self.is_ask_due = true;
     }
 
-    /// Records why the pupil no longer has the real arm.
+    /// Records why the lease of the pupil ended.
     pub(crate) const fn end_lease(&mut self, why: LeaseEnd) {
         self.over = Some(why);
     }
 
-    pub(crate) fn take_report(&mut self, now: Instant, report: Report) {
+    pub(crate) fn take_report(&mut self, now: Instant, report: TabReport) {
         (self.report, self.answered, self.waits_for_answer) = (Some(report), now, false);
     }
 

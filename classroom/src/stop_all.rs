@@ -4,7 +4,7 @@ use protocol_core::time::{Duration, Instant};
 
 use crate::message::{StopNews, StopOutcome, TileStop};
 
-/// A stop that an arm has not confirmed is sent again after this time.
+/// A stop that an arm has not confirmed is sent again after this time; at the real arm, not while a hold is in progress.
 const REPEAT: Duration = Duration::from_millis(100);
 
 /// A stop on its way to one arm.

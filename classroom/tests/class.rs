@@ -2,16 +2,16 @@
 
 #![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::indexing_slicing, clippy::panic)] // Tests.
 
-use classroom::message::{ClassNews, NotGiven, POINTS, Presence, Refusal, Tile, TileStop};
+use classroom::message::{ClassNews, NotGiven, POINTS, Refusal, TabPresence, Tile, TileStop};
 use classroom::{
     ArmNews, ClassInfo, Classroom, ConnectionId, Doing, FromPupil, FromTeacher, LeaseEnd, MOST_PUPILS,
-    Report, StopOutcome, ToPupil, ToTeacher,
+    StopOutcome, TabReport, ToPupil, ToTeacher,
 };
 use proptest::prelude::*;
 use protocol_core::time::{Duration, Instant};
 
-const REPORT: Report =
-    Report { points: Some([[0, 200, 100]; POINTS]), doing: Doing::Ready, goals: None, is_hidden: false };
+const REPORT: TabReport =
+    TabReport { points: Some([[0, 200, 100]; POINTS]), doing: Doing::Ready, goals: None, is_hidden: false };
 const ANSWERS: ArmNews =
     ArmNews { answers: true, may_hear: true, is_holding: false, holds: false, is_limp: false };
 const HOLDS: ArmNews = ArmNews { holds: true, ..ANSWERS };
@@ -125,7 +125,7 @@ fn names_are_cleaned_unique_and_kept_by_the_key() {
     assert_eq!(lesson.join("mia").1, "mia 2");
     assert_eq!(lesson.join("<b>Leo</b>").1, "<b>Leo</b>", "the pages show it as text");
     lesson.class.close(lesson.now, mia);
-    assert_eq!(lesson.tile("Mia").presence, Presence::Lost);
+    assert_eq!(lesson.tile("Mia").presence, TabPresence::Lost);
     assert_eq!(lesson.join("Mia").1, "Mia 3", "another one who wants the name");
     let again = lesson.join_with("Mia", Some("key 1"));
     assert_eq!(
@@ -142,7 +142,7 @@ fn names_are_cleaned_unique_and_kept_by_the_key() {
     assert_eq!(lesson.hear_all(again), [ToPupil::Refused(Refusal::OtherTab)]);
     assert!(lesson.class.is_over(again) && !lesson.class.is_over(other));
     lesson.class.close(lesson.now, again);
-    assert_eq!(lesson.tile("Ida").presence, Presence::Here, "the end of the old tab is no loss");
+    assert_eq!(lesson.tile("Ida").presence, TabPresence::Here, "the end of the old tab is no loss");
 }
 
 #[test]
@@ -252,13 +252,13 @@ fn tabs_are_asked_one_question_at_a_time_and_silent_ones_are_shown() {
     assert_eq!(lesson.hear_all(mia), [ToPupil::Ask { arm: None, over: None }]);
     lesson.pass(3_900);
     assert_eq!(lesson.hear_all(mia), [], "the question is not answered yet");
-    assert_eq!(lesson.tile("Mia").presence, Presence::Here);
+    assert_eq!(lesson.tile("Mia").presence, TabPresence::Here);
     lesson.pass(4_100);
-    assert_eq!(lesson.tile("Mia").presence, Presence::Silent);
+    assert_eq!(lesson.tile("Mia").presence, TabPresence::Silent);
     assert_eq!(lesson.hear_all(mia).len(), 1, "asked again");
     lesson.say(mia, &FromPupil::Report(REPORT));
     let tile = lesson.tile("Mia");
-    assert_eq!((tile.presence, tile.report), (Presence::Here, Some(REPORT)));
+    assert_eq!((tile.presence, tile.report), (TabPresence::Here, Some(REPORT)));
 }
 
 /// The page takes a silence of 10 s for a dead connection.
@@ -523,7 +523,7 @@ proptest! {
             names.dedup();
             prop_assert_eq!(names.len(), shown.pupils.len());
             let holder = shown.arm.unwrap().holder;
-            let is_there = |tile: &Tile| Some(tile.pupil) == holder && tile.presence == Presence::Here;
+            let is_there = |tile: &Tile| Some(tile.pupil) == holder && tile.presence == TabPresence::Here;
             prop_assert!(holder.is_none() || shown.pupils.iter().any(is_there));
             prop_assert!(shown.stop.is_none_or(|stop| stop.confirmed <= stop.asked));
         }
@@ -535,7 +535,8 @@ proptest! {
                 }
             }
         }
-        let is_missed = |tile: &Tile| tile.presence != Presence::Lost && tile.stop == Some(TileStop::Asked);
+        let is_asked = |tile: &Tile| tile.stop == Some(TileStop::Asked);
+        let is_missed = |tile: &Tile| tile.presence != TabPresence::Lost && is_asked(tile);
         prop_assert!(!lesson.shown().pupils.iter().any(is_missed));
     }
 }

@@ -1,4 +1,4 @@
-//! What the firmware and the self-test image share: the drivers of the chip, and the logic that they need.
+//! The library of the firmware and of the self-test image: the drivers of the chip, and the logic that the two need.
 //!
 //! The logic needs no hardware. Its tests run on the host, because the emulator has no watchdog, no reset causes, no clock
 //! tree and no working flash. The drivers are in `chip`, which exists for the chip only.

@@ -1,9 +1,9 @@
 //! The log of the main loop. defmt-rtt masks all interrupts for a whole log line. So the loop writes at most one in each pass,
-//! while both serial lines pause or a debugger is attached.
+//! while both serial lines pause or a debugger is attached. The flash driver logs its errors at once.
 
 use cortex_m::peripheral::DCB;
-use firmware_stm32::chip::host_link::HostLink;
-use firmware_stm32::chip::servo_link::ServoLink;
+use firmware_stm32::chip::host_link::HostUart;
+use firmware_stm32::chip::servo_link::ServoUart;
 use firmware_stm32::log_gate::LogGate;
 use motion_core::{Controller, Storage, Vacuum};
 use protocol_core::time::{Duration, Instant};
@@ -72,14 +72,14 @@ impl Log {
 
     /// Writes the next line if both serial lines are idle, or if a debugger is attached.
     #[inline(never)]
-    pub(crate) fn poll(&mut self, now: Instant, host: &HostLink, servos: &ServoLink, arm: &mut Controller) {
+    pub(crate) fn poll(&mut self, now: Instant, host: &HostUart, servos: &ServoUart, arm: &mut Controller) {
         let is_sending = host.is_sending() || servos.is_sending();
         if self.gate.is_open(now, is_sending, DCB::is_debugger_attached()) {
             self.write(now, host, servos, arm);
         }
     }
 
-    fn write(&mut self, now: Instant, host: &HostLink, servos: &ServoLink, arm: &mut Controller) {
+    fn write(&mut self, now: Instant, host: &HostUart, servos: &ServoUart, arm: &mut Controller) {
         if let Some(vacuum) = self.vacuum.take() {
             return defmt::info!("{}", vacuum);
         }
@@ -92,7 +92,7 @@ impl Log {
         self.due = self.lines_due;
     }
 
-    fn write_about_lines(&mut self, now: Instant, host: &HostLink, servos: &ServoLink, arm: &mut Controller) {
+    fn write_about_lines(&mut self, now: Instant, host: &HostUart, servos: &ServoUart, arm: &mut Controller) {
         self.next = match self.next {
             NextLine::Host => {
                 defmt::info!("host {}", host.errors());

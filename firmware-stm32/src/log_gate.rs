@@ -1,5 +1,5 @@
-//! When the firmware may write a log line. The log masks all interrupts for a whole line, longer than a byte lasts at 1 Mbaud,
-//! so a log line is written only while both serial lines are idle. With a debugger attached it is written at once.
+//! When the main loop may write a line of its log. The log masks all interrupts for a whole line, longer than a byte lasts at
+//! 1 Mbaud, so the line is written only while both serial lines are idle. With a debugger attached it is written at once.
 
 use protocol_core::time::{Duration, Instant};
 

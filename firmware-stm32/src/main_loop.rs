@@ -7,9 +7,9 @@ use firmware_stm32::bus_pause::PauseWait;
 use firmware_stm32::chip::board;
 use firmware_stm32::chip::clock::{self, Clock};
 use firmware_stm32::chip::flash_registers::ChipFlashRegisters;
-use firmware_stm32::chip::host_link::HostLink;
+use firmware_stm32::chip::host_link::HostUart;
 use firmware_stm32::chip::outputs::Outputs;
-use firmware_stm32::chip::servo_link::ServoLink;
+use firmware_stm32::chip::servo_link::ServoUart;
 use firmware_stm32::chip::uart::{CHUNK, Received};
 use firmware_stm32::chip::watchdog::Watchdog;
 use firmware_stm32::flash::Flash;
@@ -27,8 +27,8 @@ const BLINK: u64 = 1 << 18;
 /// The drivers that the loop connects to the controller.
 pub(crate) struct MainLoop<'a> {
     pub(crate) clock: Clock,
-    pub(crate) host: HostLink,
-    pub(crate) servos: ServoLink,
+    pub(crate) host: HostUart,
+    pub(crate) servos: ServoUart,
     pub(crate) settings: Settings<Flash<ChipFlashRegisters<'a>>>,
     pub(crate) outputs: Outputs,
     pub(crate) watchdog: &'a Watchdog,
@@ -54,7 +54,7 @@ impl MainLoop<'_> {
         }
     }
 
-    /// Carries out all outputs that are due at `now`. Returns the time of the next poll.
+    /// Carries out the outputs that are due at `now`, up to a save. Returns the time of the next poll.
     fn act(&mut self, now: Instant, arm: &mut Controller) -> Instant {
         loop {
             match arm.poll(now, self.host.room()) {

@@ -1,11 +1,11 @@
 //! The only frames that the self-test image sends to the servos, except in a crash: pings and reads. No constructor of
-//! [`Question`] makes a write, so the image cannot switch torque on or send a goal.
+//! [`BusQuestion`] makes a write, so the image cannot switch torque on or send a goal.
 
 use motion_core::servo_bus::frame::{self, Decoder, Reading, ServoFrameBuffer, register};
 
 /// A ping or a read: a frame that changes nothing in a servo.
 #[derive(Clone, Debug)]
-pub struct Question {
+pub struct BusQuestion {
     frame: ServoFrameBuffer,
     id: u8,
     /// Length of the answer's parameters, in bytes.
@@ -17,7 +17,7 @@ const FIRST_ABSENT_ID: u8 = 8;
 /// How many ids there are from [`FIRST_ABSENT_ID`] to 253. 254 is the broadcast id.
 const ABSENT_IDS: u16 = 246;
 
-impl Question {
+impl BusQuestion {
     /// A ping, whose answer has no parameters.
     #[must_use]
     pub fn ping(id: u8) -> Self {
@@ -61,7 +61,7 @@ impl Question {
 
     /// Finds the answer in the received bytes and returns its parameters; `None` without an answer. The echo may come first.
     #[must_use]
-    pub fn answer(&self, received: &[u8]) -> Option<Answer> {
+    pub fn answer(&self, received: &[u8]) -> Option<AnswerParams> {
         let mut decoder = Decoder::new();
         decoder.push(self.without_echo(received));
         while let Some(frame) = decoder.pull() {
@@ -69,7 +69,7 @@ impl Question {
                 && frame.id == self.id
                 && frame.params.len() == usize::from(self.length)
             {
-                return Answer::from_slice(frame.params).ok();
+                return AnswerParams::from_slice(frame.params).ok();
             }
         }
         None
@@ -82,7 +82,7 @@ impl Question {
 }
 
 /// The parameters of an answer.
-pub type Answer = heapless::Vec<u8, { Reading::REGISTERS as usize }>;
+pub type AnswerParams = heapless::Vec<u8, { Reading::REGISTERS as usize }>;
 
 /// Counts of the echoes of frames without an answer.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -126,10 +126,10 @@ mod tests {
     use super::*;
 
     /// Every question that the constructors can make.
-    fn all() -> impl Iterator<Item = Question> {
-        let kinds = [Question::ping, Question::measure, Question::torque_switch];
+    fn all() -> impl Iterator<Item = BusQuestion> {
+        let kinds = [BusQuestion::ping, BusQuestion::measure, BusQuestion::torque_switch];
         let to_servos = kinds.into_iter().flat_map(|kind| (0..=u8::MAX).map(kind));
-        to_servos.chain((0..=u16::MAX).map(Question::to_absent_servo))
+        to_servos.chain((0..=u16::MAX).map(BusQuestion::to_absent_servo))
     }
 
     #[test]
@@ -143,20 +143,20 @@ mod tests {
     #[test]
     fn a_ping_of_an_absent_servo_addresses_no_servo_of_the_arm_and_is_no_broadcast() {
         for number in 0..=u16::MAX {
-            assert!((FIRST_ABSENT_ID..0xFE).contains(&Question::to_absent_servo(number).frame()[2]));
+            assert!((FIRST_ABSENT_ID..0xFE).contains(&BusQuestion::to_absent_servo(number).frame()[2]));
         }
     }
 
     #[test]
     fn an_answer_is_found_with_and_without_an_echo() {
-        let question = Question::torque_switch(3);
+        let question = BusQuestion::torque_switch(3);
         let answer = [0xFF, 0xFF, 3, 3, 0, 2, 0xF7];
         assert_eq!(question.answer(&answer).unwrap(), [2]);
         assert_eq!(question.answer(&[question.frame(), &answer].concat()).unwrap(), [2]);
         assert_eq!(question.answer(question.frame()), None, "echo only");
         assert_eq!(question.answer(&[0xFF, 0xFF, 4, 3, 0, 2, 0xF6]), None, "answer of another servo");
-        assert_eq!(Question::ping(3).answer(Question::ping(3).frame()), None, "echo of a ping");
-        assert_eq!(Question::ping(3).answer(&[0xFF, 0xFF, 3, 2, 0, 0xFA]).unwrap(), []);
+        assert_eq!(BusQuestion::ping(3).answer(BusQuestion::ping(3).frame()), None, "echo of a ping");
+        assert_eq!(BusQuestion::ping(3).answer(&[0xFF, 0xFF, 3, 2, 0, 0xFA]).unwrap(), []);
     }
 
     #[test]

@@ -4,10 +4,10 @@ use embedded_io::{BufRead, Write};
 use firmware_stm32::chip::board;
 use firmware_stm32::chip::clock;
 use firmware_stm32::chip::delay::delay_micros;
-use firmware_stm32::chip::servo_link::ServoLink;
+use firmware_stm32::chip::servo_link::ServoUart;
 use firmware_stm32::chip::uart::Received;
 use firmware_stm32::line_errors::LineErrors;
-use firmware_stm32::question::{Answer, Question};
+use firmware_stm32::question::{AnswerParams, BusQuestion};
 use motion_core::servo_bus::ByteTime;
 
 /// Room for the echo of a question and the answer to it.
@@ -16,15 +16,15 @@ const RECEIVED: usize = 64;
 /// The bytes received after a question.
 pub(crate) type ReceivedBytes = heapless::Vec<u8, RECEIVED>;
 
-/// The servo bus. It owns the link, and its methods send nothing but a [`Question`].
+/// The servo bus. It owns the link, and its methods send nothing but a [`BusQuestion`].
 pub(crate) struct ReadOnlyBus {
-    link: ServoLink,
+    link: ServoUart,
     timeout_micros: u32,
 }
 
 impl ReadOnlyBus {
     /// Takes ownership of the link. The timeout of an answer counts from the last byte of the question.
-    pub(crate) const fn new(link: ServoLink, timeout_micros: u32) -> Self {
+    pub(crate) const fn new(link: ServoUart, timeout_micros: u32) -> Self {
         Self { link, timeout_micros }
     }
 
@@ -35,7 +35,7 @@ impl ReadOnlyBus {
 
     /// Sends a question. Returns the answer and its delay after the last byte of the question, in microseconds; `None` if no
     /// answer comes before the timeout.
-    pub(crate) fn ask(&mut self, question: &Question) -> Option<(Answer, u32)> {
+    pub(crate) fn ask(&mut self, question: &BusQuestion) -> Option<(AnswerParams, u32)> {
         let mut answer = None;
         let taken = self.listen(question, |received| {
             answer = question.answer(received);
@@ -44,9 +44,9 @@ impl ReadOnlyBus {
         answer.map(|answer| (answer, taken))
     }
 
-    /// Sends a question to an absent servo. Returns the received bytes once there are as many as in the frame of the question,
-    /// or at the timeout. On a wire the echo is complete with the last byte sent.
-    pub(crate) fn echo(&mut self, question: &Question) -> ReceivedBytes {
+    /// Sends a question to an absent servo, and returns its echo: the received bytes, once they are as many as were sent, or at
+    /// the timeout.
+    pub(crate) fn echo(&mut self, question: &BusQuestion) -> ReceivedBytes {
         let mut echo = ReceivedBytes::new();
         self.listen(question, |received| {
             echo.clear();
@@ -59,7 +59,7 @@ impl ReadOnlyBus {
 
     /// Sends a question and receives until `is_enough` or the timeout. Returns the time since the last byte of the question
     /// was sent, in microseconds.
-    fn listen(&mut self, question: &Question, mut is_enough: impl FnMut(&[u8]) -> bool) -> u32 {
+    fn listen(&mut self, question: &BusQuestion, mut is_enough: impl FnMut(&[u8]) -> bool) -> u32 {
         delay_micros(u32::try_from(board::SERVO_GUARD_TIME.as_micros()).unwrap_or(u32::MAX));
         self.take(&mut ReceivedBytes::new());
         let Ok(()) = self.link.write_all(question.frame());

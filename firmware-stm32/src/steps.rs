@@ -6,11 +6,11 @@ use embedded_io::{BufRead, Write as _};
 use firmware_stm32::chip::board;
 use firmware_stm32::chip::clock::{self, Clock};
 use firmware_stm32::chip::gpio::{DigitalOutput, Switch};
-use firmware_stm32::chip::host_link::HostLink;
+use firmware_stm32::chip::host_link::HostUart;
 use firmware_stm32::chip::uart::Received;
 use firmware_stm32::chip::watchdog::Watchdog;
 use firmware_stm32::clock_rates::ClockSource;
-use firmware_stm32::question::{Echoes, Question};
+use firmware_stm32::question::{BusQuestion, Echoes};
 use firmware_stm32::reset_cause::ResetCause;
 use firmware_stm32::{led_pattern, vdd};
 use motion_core::servo_bus::Reading;
@@ -37,8 +37,8 @@ const MOTOR_STATE: u8 = 2;
 macro_rules! say {
     ($to:expr, $($words:tt)*) => {{
         defmt::info!($($words)*);
-        let _ = write!(Text(&mut $to.host), $($words)*);
-        let _ = Text(&mut $to.host).write_str("\r\n");
+        let _ = write!(HostText(&mut $to.host), $($words)*);
+        let _ = HostText(&mut $to.host).write_str("\r\n");
     }};
 }
 
@@ -59,7 +59,7 @@ pub(crate) struct Board {
 pub(crate) struct SelfTest {
     pub(crate) board: Board,
     pub(crate) clock: Clock,
-    pub(crate) host: HostLink,
+    pub(crate) host: HostUart,
     pub(crate) servos: ReadOnlyBus,
     pub(crate) led: Switch<DigitalOutput>,
     pub(crate) watchdog: Watchdog,
@@ -68,9 +68,9 @@ pub(crate) struct SelfTest {
 }
 
 /// The host link as an output for text.
-struct Text<'a>(&'a mut HostLink);
+struct HostText<'a>(&'a mut HostUart);
 
-impl fmt::Write for Text<'_> {
+impl fmt::Write for HostText<'_> {
     fn write_str(&mut self, text: &str) -> fmt::Result {
         let Ok(()) = self.0.write_all(text.as_bytes());
         Ok(())
@@ -143,7 +143,7 @@ impl SelfTest {
         let before = self.servos.errors();
         let mut echoes = Echoes::default();
         while echoes.sent() < ECHOES && !echoes.is_silent() {
-            let question = Question::to_absent_servo(echoes.sent());
+            let question = BusQuestion::to_absent_servo(echoes.sent());
             let received = self.servos.echo(&question);
             echoes.count(question.frame(), &received);
             self.feed_and_blink();
@@ -166,7 +166,7 @@ impl SelfTest {
         let (mut answers, mut longest) = (0, 0);
         for _ in 0..QUESTIONS {
             self.feed_and_blink();
-            if let Some((_, micros)) = self.servos.ask(&Question::measure(id)) {
+            if let Some((_, micros)) = self.servos.ask(&BusQuestion::measure(id)) {
                 answers += 1;
                 longest = longest.max(micros);
             }
@@ -194,7 +194,7 @@ impl SelfTest {
         while clock::micros().wrapping_sub(start) < SEARCH_MICROS {
             for id in 0..board::SERVOS {
                 self.feed_and_blink();
-                if self.servos.ask(&Question::ping(id)).is_some() {
+                if self.servos.ask(&BusQuestion::ping(id)).is_some() {
                     return Some(id);
                 }
             }
@@ -226,11 +226,11 @@ impl SelfTest {
     }
 
     fn measure(&mut self, id: u8) -> Option<Reading> {
-        self.servos.ask(&Question::measure(id)).and_then(|(answer, _)| Reading::parse(&answer))
+        self.servos.ask(&BusQuestion::measure(id)).and_then(|(answer, _)| Reading::parse(&answer))
     }
 
     fn torque_switch(&mut self, id: u8) -> i16 {
-        let answer = self.servos.ask(&Question::torque_switch(id));
+        let answer = self.servos.ask(&BusQuestion::torque_switch(id));
         answer.and_then(|(answer, _)| answer.first().copied()).map_or(UNKNOWN, i16::from)
     }
 

@@ -11,7 +11,7 @@
 //!
 //! The crate reads no clock and opens no port: time and bytes are arguments. The blocking library, the hub of
 //! `sevenbot serve` and the page in a browser are shells round it. It does not know what the registers of the arm mean,
-//! except for three things that all shells share: the layout versions of their blocks ([`Snapshot`]), the registers of a
+//! except for three things that its shells share: the layout versions of their blocks ([`Snapshot`]), the registers of a
 //! server ([`sharing`]), and the limits that a stop has to keep ([`keep_limits`]).
 //!
 //! ```

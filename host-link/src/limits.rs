@@ -13,9 +13,9 @@ const DEGREE: u16 = 100;
 /// Brings the targets that hold an arm within its limits. All are in hundredths of a degree: `present` holds the
 /// targets of the arm, and `written` the targets that are to be written. `limits` is register 188.
 ///
-/// If the targets of joints 2 and 3 break the limit of the linkage, the joint that moves inwards gets a target further
-/// inwards, at the limit. Targets against a limit that equal those of the arm become `None`: the arm was outside before,
-/// and holds there.
+/// If the targets of joints 2 and 3 break the limit of the linkage, joint 2 gets a target further inwards, at the limit, if it
+/// moves inwards or joint 3 gets no target. Otherwise joint 3 gets one. Targets against a limit that equal those of the arm
+/// become `None`: the arm was outside before, and holds there.
 pub fn keep_limits(limits: u8, present: &[u16; JOINTS], written: &mut [Option<u16>; JOINTS]) {
     let [_, two, three, .., seven] = written;
     let &[_, two_now, three_now, .., seven_now] = present;

@@ -3,8 +3,8 @@
 use protocol_core::time::{Duration, Instant};
 
 /// The allowance until the first reply has come: a reply may be this much later than the time on the line explains. A USB
-/// adapter holds bytes back for up to 16 ms in each direction (the latency timer of FTDI chips). An arm answers within a
-/// control cycle of 10 ms. The rest is for a busy host, or a server with other clients.
+/// adapter holds received bytes back for up to 16 ms (the latency timer of FTDI chips). An arm answers within a control cycle
+/// of 10 ms. The rest is for a busy host, or a server with other clients.
 pub const ROUND_TRIP: Duration = Duration::from_millis(100);
 /// The shortest allowance, for a line on which all replies came in time.
 const SHORTEST: Duration = Duration::from_millis(4);
@@ -47,13 +47,13 @@ impl LineTime {
     }
 
     /// How much later than due a reply may be: twice the recent delay. So a lost reply costs little on a line where replies
-    /// come in time, and a server that becomes slower does not get more repeated reads.
+    /// come in time, and a server that became slower soon gets no needless repeats any more.
     pub(crate) const fn allowance(&self) -> Duration {
         self.allowance
     }
 
-    /// Notes that a reply came at `now`, and was due at `due`. A longer delay lengthens the allowance at once. Each later reply
-    /// shortens it by 1/8.
+    /// Notes that a reply came at `now`, and was due at `due`. A longer delay lengthens the allowance at once. Any other
+    /// reply shortens it by at most 1/8.
     pub(crate) fn note_reply(&mut self, due: Instant, now: Instant) {
         let forgotten = self.allowance.as_micros() / FORGETTING;
         let allowance = self.allowance.as_micros().saturating_sub(forgotten);

@@ -17,7 +17,7 @@ use crate::pending_reads::{Matched, PendingReads, Wait};
 use crate::snapshot::Snapshot;
 use crate::span::Span;
 
-/// At most this many markers are sent for a read. If no reply to them comes, the read is sent all the same.
+/// At most this many markers in a row are sent for a read. If no reply to them comes, the read is sent all the same.
 const MOST_MARKERS: u32 = 3;
 /// The register that a marker reads. A marker behind others reads some registers more.
 const MARKED: Span = Span::of(&DEVICE_CODE);
@@ -98,6 +98,7 @@ impl HostLink {
     }
 
     /// As [`Self::write`], but sent before all other requests in the queue: for a stop. Several such writes keep their order.
+    /// A repeat of a read that is in the queue is sent after it, too.
     pub fn write_ahead(&mut self, map: Map, address: u8, values: &[u8]) {
         let place = self.queue.iter().take_while(|queued| matches!(queued, Queued::WriteAhead(_))).count();
         self.queue.insert(place, Queued::WriteAhead(encoded_write(map, address, values)));
@@ -123,9 +124,9 @@ impl HostLink {
         *self = Self { line, last_id, events, ..Self::new(self.options) };
     }
 
-    /// Takes bytes of the arm that have arrived until `now`. An empty slice states that no others have arrived. A timeout acts
-    /// only after a call with its time or a later one, so that a host that was suspended first passes on the bytes that
-    /// arrived meanwhile.
+    /// Takes bytes of the arm that have arrived until `now`. An empty slice states that no others have arrived. The timeout of
+    /// a read acts only after a call with its time or a later one, so that a host that was suspended first passes on the bytes
+    /// that arrived meanwhile.
     pub fn bytes(&mut self, now: Instant, bytes: &[u8]) {
         self.heard_until = self.heard_until.max(now);
         let mut rest = bytes;
@@ -156,7 +157,7 @@ impl HostLink {
         self.line.busy_until()
     }
 
-    /// The bytes of the replies that are on their way.
+    /// The bytes of the replies that are on their way to open reads, without those to markers.
     #[must_use]
     pub fn awaited_bytes(&self) -> usize {
         self.pending.awaited().map(|span| MIN_LENGTH + usize::from(span.count())).sum()
@@ -230,9 +231,9 @@ impl HostLink {
 
     fn pull_frames(&mut self) {
         while let Some(found) = self.deframer.pull() {
-            match found.map(Message::from) {
-                Ok(Message::Reply(values)) => self.take_reply(values),
-                Ok(Message::Other(event)) => self.events.push_back(event),
+            match found.map(ArmMessage::from) {
+                Ok(ArmMessage::Reply(values)) => self.take_reply(values),
+                Ok(ArmMessage::Other(event)) => self.events.push_back(event),
                 Err(defect) => {
                     self.events.push_back(HostEvent::Damaged(defect));
                     let damaged = self.pending.note_damage(self.heard_until);
@@ -295,13 +296,13 @@ impl Markers {
     const NONE: Self = Self { sent: 0, due: Instant::FAR_FUTURE };
 }
 
-enum Message {
+enum ArmMessage {
     /// The reply to a read, or a report of map 2.2.
     Reply(Snapshot),
     Other(HostEvent),
 }
 
-impl From<Frame<'_>> for Message {
+impl From<Frame<'_>> for ArmMessage {
     fn from(frame: Frame<'_>) -> Self {
         let values = Snapshot { address: frame.address, values: frame.data.to_vec() };
         match (frame.function, Alarm::from_frame(frame)) {

@@ -12,15 +12,15 @@ use crate::span::Span;
 ///
 /// A read is repeated as soon as its reply is later than an allowance: twice the recent delay of replies, and
 /// [`ROUND_TRIP`] before the first reply. The time to the next repeat doubles, up to [`ROUND_TRIP`] or the allowance,
-/// whichever is longer. A read whose reply comes damaged is repeated at once. A read changes nothing, so a needless repeat
-/// does no harm. The read is given up `attempts` times `timeout` after the reply to its first attempt was due, or earlier if
-/// its reply is known to be lost and it may not be repeated. So a lost reply costs little time, several lost replies are no
-/// error, and a slow arm gets the whole time.
+/// whichever is longer, and never exceeds `timeout`. A read whose reply comes damaged is repeated at once. A read changes
+/// nothing, so a needless repeat does no harm. The read is given up `attempts` times `timeout` after the reply to its first
+/// attempt was due, or earlier if its reply is known to be lost and it may not be repeated. So a lost reply costs little time,
+/// several lost replies are no error, and a slow arm gets the whole time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Patience {
     /// The wait for the reply lasts this many times `timeout`, at least once. A read with one attempt is not repeated.
     pub attempts: u32,
-    /// The longest wait for one attempt, in addition to the time on the line.
+    /// The time that each attempt adds to the wait. The wait begins when the reply to the first attempt is due.
     pub timeout: Duration,
 }
 
@@ -35,7 +35,7 @@ impl Patience {
         self.attempts > 1
     }
 
-    /// The time between attempt number `sent`, from 1, and the next one.
+    /// The time from when the reply to attempt number `sent`, from 1, is due to the next attempt.
     fn before_repeat(self, sent: u32, allowance: Duration) -> Duration {
         let doubled = allowance.as_micros().saturating_mul(1 << sent.saturating_sub(1).min(32));
         let longest = self.timeout.min(allowance.max(ROUND_TRIP));
@@ -110,8 +110,8 @@ impl OpenReads {
         self.0.drain(..)
     }
 
-    /// The reply to this read came damaged at `now`: the read is repeated at once. The attempt does not lengthen the time to
-    /// the next repeat, because the arm answers in time.
+    /// The reply to this read came damaged at `now`: the read is repeated at once, if it may be. The attempt does not lengthen
+    /// the time to the next repeat, because the arm answers in time.
     pub(crate) fn note_damage(&mut self, id: RequestId, now: Instant) {
         let damaged = self.0.iter_mut().find(|read| read.id == id && read.patience.repeats());
         if let Some(read) = damaged {

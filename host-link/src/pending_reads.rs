@@ -4,11 +4,11 @@
 //! So:
 //!
 //! * A reply belongs to the oldest read that was sent with its range. The reads before that one have lost their replies.
-//! * No two reads on their way have the same range: the second asks for a few registers more. This also keeps a read of the
-//!   present positions apart from a report ([D14](protocol_core::decisions#d14)).
+//! * Where another range is left, no two reads on their way have the same one: the second asks for a few registers more. This
+//!   also keeps a read of the present positions apart from a report ([D14](protocol_core::decisions#d14)).
 //! * A read that was given up stays in the list, so that its late reply is recognised.
-//! * Where no other range is left, a new read waits until it is known whether a reply to the old one comes. The reply to a
-//!   marker tells: a marker is a read of another range, sent behind the old read.
+//! * Where no other range is left, a repeat has the range of an earlier attempt. A new read waits until it is known whether a
+//!   reply to the old one comes. The reply to a marker tells: a marker is a read of another range, sent behind the old read.
 
 use std::collections::VecDeque;
 
@@ -17,8 +17,8 @@ use protocol_core::time::Instant;
 use crate::event::RequestId;
 use crate::span::Span;
 
-/// At most this many attempts of reads that were given up are remembered. A silent arm is asked up to ten times a second, so
-/// they cover six seconds.
+/// At most this many attempts of reads that were given up are remembered. One read asks a silent arm about ten times a second,
+/// so they cover about six seconds.
 const REMEMBERED: usize = 64;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

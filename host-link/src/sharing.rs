@@ -14,8 +14,8 @@ const COMMAND: u8 = 239;
 /// The value of register 232: the version of the layout of this block.
 const VERSION: u8 = 1;
 /// The largest distance by which a joint droops under its weight from a target that it has reached, in hundredths of a
-/// degree. A stop may leave the target of such a joint unchanged ([D24](protocol_core::decisions#d24)). A joint that is
-/// farther off is at an obstacle.
+/// degree. A stop may leave the target of such a joint unchanged ([D24](protocol_core::decisions#d24)). A resting joint
+/// that is farther off is at an obstacle.
 pub const DROOP: u16 = 150;
 
 /// Are all these registers the server's? `false` for a count of 0.
@@ -28,7 +28,7 @@ pub const fn is_own(address: u8, count: u8) -> bool {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum DrivenBy {
-    /// No program wrote targets within the last second.
+    /// No program wrote targets within the last second, or the arm was stopped or handed over since.
     #[default]
     Nobody = 0,
     /// The program that reads.
@@ -46,7 +46,7 @@ impl DrivenBy {
 /// What a program writes to register 239.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
-pub enum Command {
+pub enum SharingCommand {
     /// The arm holds where it is.
     Stop = 1,
     /// The program starts anew after another program's stop: the server passes this program's targets on again.
@@ -55,7 +55,7 @@ pub enum Command {
     HandOver = 3,
 }
 
-impl Command {
+impl SharingCommand {
     /// The register, and the value that a program writes there to give this command.
     #[must_use]
     pub const fn write(self) -> (u8, [u8; 1]) {
@@ -182,14 +182,14 @@ mod tests {
 
     #[test]
     fn a_command_is_found_in_any_write_that_covers_it() {
-        for command in [Command::Stop, Command::StartAnew, Command::HandOver] {
+        for command in [SharingCommand::Stop, SharingCommand::StartAnew, SharingCommand::HandOver] {
             let (address, values) = command.write();
-            assert_eq!(Command::in_write(address, &values), Some(command));
+            assert_eq!(SharingCommand::in_write(address, &values), Some(command));
         }
-        assert_eq!(Command::in_write(239, &[1]), Some(Command::Stop));
-        assert_eq!(Command::in_write(237, &[0, 0, 3, 9]), Some(Command::HandOver));
+        assert_eq!(SharingCommand::in_write(239, &[1]), Some(SharingCommand::Stop));
+        assert_eq!(SharingCommand::in_write(237, &[0, 0, 3, 9]), Some(SharingCommand::HandOver));
         for (address, values) in [(239, &[][..]), (239, &[0]), (238, &[1]), (240, &[1])] {
-            assert_eq!(Command::in_write(address, values), None);
+            assert_eq!(SharingCommand::in_write(address, values), None);
         }
     }
 }

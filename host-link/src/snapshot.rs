@@ -64,19 +64,19 @@ impl Snapshot {
         Joint::ALL.map(|joint| self.word(row.of(joint)))
     }
 
-    /// Does the firmware have registers 128 to 191 ([D21](protocol_core::decisions#d21))?
+    /// Does the firmware have registers 128 to 191 in the known layout ([D21](protocol_core::decisions#d21))?
     #[must_use]
     pub fn has_extended_block(&self) -> bool {
         self.byte(&EXTENDED_VERSION) == KNOWN_LAYOUT
     }
 
-    /// Does the firmware have registers 192 to 199 ([D27](protocol_core::decisions#d27))?
+    /// Does the firmware have registers 192 to 199 in the known layout ([D27](protocol_core::decisions#d27))?
     #[must_use]
     pub fn has_protection_block(&self) -> bool {
         self.byte(&PROTECTION_VERSION) == KNOWN_LAYOUT
     }
 
-    /// Does the firmware have registers 240 to 255?
+    /// Does the firmware have registers 240 to 255 in the known layout?
     #[must_use]
     pub fn has_status_block(&self) -> bool {
         self.byte(&STATUS_VERSION) == KNOWN_LAYOUT
@@ -103,7 +103,7 @@ impl Snapshot {
         self.address <= span.address() && usize::from(span.address()) + usize::from(span.count()) <= end
     }
 
-    /// The registers; none if they would reach past 255.
+    /// The registers; none if they would reach past 255 or exceed one frame.
     #[must_use]
     pub fn span(&self) -> Span {
         Span::of_values(self.address, &self.values).unwrap_or(Span::NONE)

@@ -1,7 +1,7 @@
 //! A file of the true angles of the joints, for tests of a controller in another process. The measurements of that controller may
 //! be old.
 //!
-//! Each line has the time in seconds since 1970, and seven angles in degrees. There is a line each 10 ms.
+//! Each line has the time in seconds since 1970, and seven angles in degrees. The next line follows after 10 ms at the earliest.
 
 use std::fs::File;
 use std::io::{self, Write};
@@ -15,7 +15,7 @@ use protocol_core::time::{Duration, Instant};
 /// Time between two lines, if the computer is fast enough.
 const PERIOD: Duration = Duration::from_millis(10);
 
-/// A file with the angles of the joints, a line each 10 ms.
+/// A file with the angles of the joints: at most one line each 10 ms.
 #[derive(Debug)]
 pub struct AngleLog {
     file: File,

@@ -5,8 +5,8 @@ use std::time::Instant as SystemInstant;
 use protocol_core::time::{Duration, Instant};
 use rustix::event::Timespec;
 
-/// A longer pause between calls means that the process was stopped (Ctrl-Z, a debugger), and the arm stops with it. After a
-/// shorter pause, on a busy computer, the arm catches up.
+/// A longer pause between calls means that the process was stopped (Ctrl-Z, a debugger): only this much time passes for the arm.
+/// After a shorter pause, on a busy computer, the arm catches up.
 const LONGEST_ABSENCE: Duration = Duration::from_millis(1_000);
 
 /// A clock that counts microseconds since its creation.

@@ -1,7 +1,7 @@
 //! The loop that serves arms on pseudo-terminals: clock, file descriptors and signals.
 //!
-//! One thread sleeps until a client writes, opens or closes a port, until a signal comes, or until an arm is due. An idle arm
-//! needs few wake-ups. An arm whose port fails ends; the others continue.
+//! One thread sleeps until a port or a control socket has news of its clients, until a signal comes, or until an arm is due. An
+//! idle arm needs few wake-ups. An arm whose port fails ends; the others continue.
 
 use std::io;
 use std::mem::MaybeUninit;

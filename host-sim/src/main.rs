@@ -316,7 +316,7 @@ fn flash(options: &Options, number: Option<u16>) -> Result<Flash<ImageFile>, Fai
 }
 
 /// Raises the limit of open files to the highest value that the system allows. An arm needs two for its port, and one each for
-/// the settings, the control socket and the recording. If the limit is too low, opening the port fails.
+/// the settings, the control socket and the recording. If the limit is too low, opening one of them fails.
 fn allow_as_many_files_as_possible() {
     let limit = getrlimit(Resource::Nofile);
     let _ = setrlimit(Resource::Nofile, Rlimit { current: limit.maximum, ..limit });

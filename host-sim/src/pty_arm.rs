@@ -18,7 +18,7 @@ use rustix::event::PollFlags;
 use rustix::event::epoll::EventFlags;
 use tracing::{Span, error, info};
 
-use crate::snapshots::{SnapshotError, Snapshots};
+use crate::snapshots::{SnapshotRefusal, Snapshots};
 use tty_ports::clients::Clients;
 use tty_ports::pty::Pty;
 
@@ -107,7 +107,7 @@ impl<F: NorFlash + Clone, C: ArmController> PtyArm<F, Plant, C> {
     ///
     /// # Errors
     /// The name is empty or too long, or there are too many copies.
-    pub fn keep_snapshot(&mut self, name: String) -> Result<(), SnapshotError> {
+    pub fn keep_snapshot(&mut self, name: String) -> Result<(), SnapshotRefusal> {
         let (simulation, ended_faults) = (self.simulation.clone(), self.ended_faults.clone());
         self.snapshots.keep(name, ArmSnapshot { simulation, ended_faults })
     }
@@ -116,10 +116,10 @@ impl<F: NorFlash + Clone, C: ArmController> PtyArm<F, Plant, C> {
     ///
     /// # Errors
     /// There is no such copy, or its settings cannot be written.
-    pub fn restore_snapshot(&mut self, name: &str) -> Result<Instant, SnapshotError> {
+    pub fn restore_snapshot(&mut self, name: &str) -> Result<Instant, SnapshotRefusal> {
         let snapshot = self.snapshots.get(name)?;
         let restored = self.simulation.restore(&snapshot.simulation);
-        restored.map_err(|error| SnapshotError::Settings(error.kind()))?;
+        restored.map_err(|error| SnapshotRefusal::Settings(error.kind()))?;
         self.ended_faults.clone_from(&snapshot.ended_faults);
         Ok(self.simulation.now())
     }

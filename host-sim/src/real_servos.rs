@@ -152,7 +152,7 @@ impl<F: NorFlash + Clone> RealServos<F> {
         let Some(serial) = self.serial.as_ref().filter(|_| !bytes.is_empty()) else { return };
         match serial.write(&bytes) {
             Ok(count) if count == bytes.len() => self.statistics.sent(now, &bytes),
-            // The controller notices that the answer is missing.
+            // The controller notices a lost question: its answer is missing.
             Ok(_) => warn!("the adapter takes no more bytes: a frame is lost"),
             Err(error) => self.lose_port(now, &error),
         }

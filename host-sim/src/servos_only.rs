@@ -35,7 +35,7 @@ pub struct AdapterConfig {
     pub link: Option<PathBuf>,
     /// The baud rate of the servos, in bits per second.
     pub baud: u32,
-    /// The delay of each block of bytes from the adapter to the client, random within this range.
+    /// The delay of each block of bytes from the adapter to the client, random within this range. A full block is sent at once.
     pub latency: Latency,
     /// The seed of the random delays of the adapter.
     pub seed: u64,

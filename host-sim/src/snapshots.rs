@@ -11,7 +11,7 @@ const LONGEST_NAME: usize = 64;
 
 /// Why a snapshot is not kept or restored.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum SnapshotError {
+pub enum SnapshotRefusal {
     /// The name is empty or too long.
     #[error("the name does not have 1 to 64 characters")]
     Name,
@@ -35,7 +35,7 @@ fn listed(names: &[String]) -> String {
     if names.is_empty() { String::new() } else { format!("; there are: {}", names.join(", ")) }
 }
 
-impl SnapshotError {
+impl SnapshotRefusal {
     /// What to do.
     #[must_use]
     pub const fn hint(&self) -> &'static str {
@@ -63,12 +63,12 @@ impl<T> Snapshots<T> {
     ///
     /// # Errors
     /// The name is empty or too long, or there are 64 other copies.
-    pub fn keep(&mut self, name: String, copy: T) -> Result<(), SnapshotError> {
+    pub fn keep(&mut self, name: String, copy: T) -> Result<(), SnapshotRefusal> {
         if !(1..=LONGEST_NAME).contains(&name.chars().count()) {
-            return Err(SnapshotError::Name);
+            return Err(SnapshotRefusal::Name);
         }
         if self.0.len() >= SNAPSHOTS && !self.0.contains_key(&name) {
-            return Err(SnapshotError::Full);
+            return Err(SnapshotRefusal::Full);
         }
         self.0.insert(name, copy);
         Ok(())
@@ -78,9 +78,9 @@ impl<T> Snapshots<T> {
     ///
     /// # Errors
     /// There is no copy with this name. The error lists the other names.
-    pub fn get(&self, name: &str) -> Result<&T, SnapshotError> {
+    pub fn get(&self, name: &str) -> Result<&T, SnapshotRefusal> {
         let unknown =
-            || SnapshotError::Unknown { name: name.to_owned(), others: self.0.keys().cloned().collect() };
+            || SnapshotRefusal::Unknown { name: name.to_owned(), others: self.0.keys().cloned().collect() };
         self.0.get(name).ok_or_else(unknown)
     }
 }

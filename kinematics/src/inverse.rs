@@ -64,8 +64,8 @@ pub fn ik5<F: Float>(wrist: Vector<F>) -> Result<[F; 3], NoSolution> {
 ///
 /// # Errors
 ///
-/// [`NoSolution::NoToolDirection`] for a direction of zero, the reasons of [`ik5`] for the wrist, or
-/// [`NoSolution::ToolDirection`] if the hand cannot point there.
+/// [`NoSolution::NoToolDirection`] for a direction of zero, [`NoSolution::NotFinite`] for an infinite one or NaN, the reasons of
+/// [`ik5`] for the wrist, or [`NoSolution::ToolDirection`] if the hand cannot point there.
 pub fn ik6<F: Float>(tip: Vector<F>, tool: Vector<F>) -> Result<[F; 5], NoSolution> {
     let Reach { arm: [t1, t2, t3], hand: [t4, t5], .. } = Reach::of(tip, tool)?;
     Ok([t1, t2, t3, t4, t5])

@@ -49,4 +49,4 @@ pub use float::Float;
 pub use forward::{Frames, forward};
 pub use inverse::{NoSolution, ik5, ik6, ik7};
 pub use vector::Vector;
-pub use workspace::{Clearance, Obstacle, Part, Workspace};
+pub use workspace::{Clearance, FixedObstacle, Part, Workspace};

@@ -61,7 +61,7 @@ pub enum Part {
 
 /// What the arm must not enter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Obstacle {
+pub enum FixedObstacle {
     /// The half space below the table.
     Table,
     /// The cylinder round the base.
@@ -74,7 +74,7 @@ pub struct Clearance {
     /// The part of which `mm` is the distance.
     pub part: Part,
     /// The obstacle from which `mm` is measured.
-    pub obstacle: Obstacle,
+    pub obstacle: FixedObstacle,
     /// The distance between part and obstacle in mm; negative inside the obstacle. The distance from the base is the larger
     /// one of the distances from its side and from its top.
     pub mm: f64,
@@ -116,7 +116,7 @@ impl Workspace {
             (Part::Wrist, arm.wrist.z),
             (Part::Elbow, arm.elbow.z),
         ];
-        smallest(Obstacle::Table, parts.map(|(part, z)| (part, z - self.table)))
+        smallest(FixedObstacle::Table, parts.map(|(part, z)| (part, z - self.table)))
     }
 }
 
@@ -133,11 +133,11 @@ fn from_base(Frames { arm, hand }: &Frames<f64>) -> Clearance {
         (Part::Hand, segment_from_base(arm.wrist, hand.tip)),
         (Part::Forearm, segment_from_base(arm.forearm, arm.wrist)),
     ];
-    smallest(Obstacle::Base, parts)
+    smallest(FixedObstacle::Base, parts)
 }
 
 /// The first of the parts with the smallest distance. `parts` is not empty.
-fn smallest<const N: usize>(obstacle: Obstacle, parts: [(Part, f64); N]) -> Clearance {
+fn smallest<const N: usize>(obstacle: FixedObstacle, parts: [(Part, f64); N]) -> Clearance {
     let none = (Part::Tip, f64::INFINITY);
     let (part, mm) = parts.into_iter().fold(none, |least, next| if next.1 < least.1 { next } else { least });
     Clearance { part, obstacle, mm }
@@ -183,14 +183,14 @@ mod tests {
     #[test]
     fn the_standard_pose_is_far_from_everything() {
         let clearance = ON_FOOT.clearance([90.0, 90.0, 65.0, 90.0, 90.0]);
-        assert_eq!((clearance.obstacle, clearance.part), (Obstacle::Base, Part::Elbow));
+        assert_eq!((clearance.obstacle, clearance.part), (FixedObstacle::Base, Part::Elbow));
         assert_eq!(clearance.mm, 74.5 + 120.0 - 10.0);
     }
 
     #[test]
     fn a_tip_below_the_table_is_told_with_its_depth() {
         let clearance = tool_down(0.0, 185.0, -100.0);
-        assert_eq!((clearance.obstacle, clearance.part), (Obstacle::Table, Part::Tip));
+        assert_eq!((clearance.obstacle, clearance.part), (FixedObstacle::Table, Part::Tip));
         assert!((clearance.mm + 40.0).abs() < 1e-9, "{clearance:?}");
         let on_a_block = Workspace { table: -101.5 };
         let angles = ik6(Vector::new(0.0, 185.0, -100.0), Vector::new(0.0, 0.0, -1.0)).expect("within reach");
@@ -201,14 +201,14 @@ mod tests {
     fn an_upright_disc_touches_the_table_by_its_edge() {
         let angles = ik6(Vector::new(0.0, 250.0, -45.0), Vector::new(0.0, 1.0, 0.0)).expect("within reach");
         let clearance = ON_FOOT.clearance(angles);
-        assert_eq!((clearance.obstacle, clearance.part), (Obstacle::Table, Part::DiscEdge));
+        assert_eq!((clearance.obstacle, clearance.part), (FixedObstacle::Table, Part::DiscEdge));
         assert!((clearance.mm + 5.0).abs() < 1e-9, "{clearance:?}");
     }
 
     #[test]
     fn a_hand_beside_the_base_is_inside_its_margin() {
         let clearance = tool_down(0.0, 100.0, -40.0);
-        assert_eq!((clearance.obstacle, clearance.part), (Obstacle::Base, Part::DiscEdge));
+        assert_eq!((clearance.obstacle, clearance.part), (FixedObstacle::Base, Part::DiscEdge));
         assert!((clearance.mm - (100.0 - 20.0 - 88.0)).abs() < 1e-9, "{clearance:?}");
     }
 

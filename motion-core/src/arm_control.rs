@@ -3,7 +3,7 @@
 //! ```text
 //!   write ──▶ registers ──▶ Joints ──▶ BusScheduler ──▶ frame for the servos
 //!                  ▲          ▲             │
-//!                Status ◀─────┴── outcome ◀─┘
+//!      ControllerStatus ◀─────┴── outcome ◀─┘
 //! ```
 //!
 //! A write is checked completely, then executed completely ([D15](protocol_core::decisions#d15) to
@@ -29,7 +29,7 @@ use crate::limit_check::LimitCheck;
 use crate::motor_state::MotorState;
 use crate::reach::{self, Reached};
 use crate::servo_bus::{Answer, Outcome};
-use crate::status::Status;
+use crate::status::ControllerStatus;
 use crate::vacuum::VacuumControl;
 
 /// Registers, joints, servo bus, status and vacuum of one arm.
@@ -40,7 +40,7 @@ pub(crate) struct ArmControl {
     pub(crate) bus: BusScheduler,
     pub(crate) vacuum: VacuumControl,
     joints: Joints,
-    status: Status,
+    status: ControllerStatus,
     watchdog: HostWatchdog,
     /// The watchdog has to be checked, once in each control cycle.
     pub(crate) watchdog_is_due: bool,
@@ -55,7 +55,7 @@ impl ArmControl {
     pub(crate) fn new(now: Instant, config: Config, stored: Option<&Image>, storage: Storage) -> Self {
         let mut registers = RegisterFile::new(config.chip_id, stored);
         let joints = Joints::new(MotorState::from_register(registers.get(MOTOR_STATE.address)));
-        let status = Status::new(storage, config.faults);
+        let status = ControllerStatus::new(storage, config.faults);
         status.show_faults(&mut registers, &joints);
         let (bus, vacuum) = (BusScheduler::new(now, &config), VacuumControl::default());
         Self {
@@ -96,7 +96,7 @@ impl ArmControl {
         if self.joints.advance(now, end, &mut self.registers) {
             self.bus.goals_changed();
         }
-        Status::show_moving(&mut self.registers, &self.joints);
+        ControllerStatus::show_moving(&mut self.registers, &self.joints);
         self.watchdog_is_due = true;
     }
 
@@ -192,7 +192,7 @@ impl ArmControl {
         self.execute(now, &accepted, changes_settings);
         self.registers.set(FEEDBACK_FREQUENCY.address, 0);
         self.joints.reach(&reached, &mut self.registers);
-        Status::show_moving(&mut self.registers, &self.joints);
+        ControllerStatus::show_moving(&mut self.registers, &self.joints);
         true
     }
 
@@ -207,7 +207,7 @@ impl ArmControl {
 
     /// Refuses a write. Returns `false`, because a refused write does not change the reports.
     fn refuse(&mut self, reason: u8, address: u8) -> bool {
-        Status::refuse(&mut self.registers, reason, address);
+        ControllerStatus::refuse(&mut self.registers, reason, address);
         false
     }
 
@@ -232,7 +232,7 @@ impl ArmControl {
             self.vacuum.set(now, pump != 0);
         }
         self.count_accepted();
-        Status::show_moving(&mut self.registers, &self.joints);
+        ControllerStatus::show_moving(&mut self.registers, &self.joints);
     }
 
     /// Applies the registers of the extended block and the protection block that act at once: watchdog and protection
@@ -260,7 +260,7 @@ impl ArmControl {
         } else {
             self.damp();
         }
-        Status::show_moving(&mut self.registers, &self.joints);
+        ControllerStatus::show_moving(&mut self.registers, &self.joints);
         self.raise_faults(fault::HOST_SILENT);
         true
     }
@@ -325,7 +325,7 @@ impl ArmControl {
 
     /// Refuses a frame whose range ends beyond address 255 ([D2](protocol_core::decisions#d2)).
     pub(crate) fn refuse_range(&mut self, address: u8) {
-        Status::refuse(&mut self.registers, refusal::MALFORMED_RANGE, address);
+        ControllerStatus::refuse(&mut self.registers, refusal::MALFORMED_RANGE, address);
     }
 
     /// Sets the state of the settings storage.

@@ -6,7 +6,8 @@
 //! ```
 //!
 //! Goals are sent before torque, and read back, so that a lost frame does not give a servo torque with an old goal: see
-//! goal_check.rs. During start-up only reads are sent. This file does not know angles.
+//! goal_check.rs. During start-up only reads are sent. A silent servo is read ten times a second. On a slow bus not every
+//! cycle reads each servo. This file does not know angles.
 
 use protocol_core::registers::map::PROTECTION;
 use protocol_core::registers::{JOINTS, Joint, RegisterFile};

@@ -116,8 +116,8 @@ impl Mounting {
     }
 }
 
-/// The servo position for an angle of a joint, limited to 0 to 1023 counts. `offset_degrees` is the joint's offset
-/// register.
+/// The servo position for an angle of a joint, limited to 0 to 1023 counts. `offset_degrees` is the joint's
+/// offset.
 #[must_use]
 pub fn counts_from_angle(joint: Joint, angle: MicroDegrees, offset_degrees: i8) -> u16 {
     let mounting = Mounting::of(joint);

@@ -19,7 +19,7 @@ use protocol_core::wire::MIN_LENGTH;
 
 use crate::arm_control::ArmControl;
 use crate::config::Config;
-use crate::host_port::{HostEvent, HostPort};
+use crate::host_port::{HostInput, HostPort};
 use crate::vacuum::Vacuum;
 
 /// An action for the shell. `poll` returns each action once.
@@ -131,10 +131,10 @@ impl Controller {
     fn execute_requests(&mut self, now: Instant, host_room: usize) {
         while self.arm.to_save.is_none()
             && self.arm.alarm.is_none()
-            && let Some(event) = self.host.next_event()
+            && let Some(input) = self.host.next_input()
         {
-            match event {
-                HostEvent::Write { map, address, values } => {
+            match input {
+                HostInput::Write { map, address, values } => {
                     self.arm.heard_host(now);
                     let changes_reports = match map {
                         Map::V22 => self.arm.write(now, address, values),
@@ -144,8 +144,8 @@ impl Controller {
                         self.host.set_report_frequencies(now, &self.arm.registers);
                     }
                 }
-                HostEvent::MalformedRange { address } => self.arm.refuse_range(address),
-                HostEvent::Corrupted => self.arm.count_corrupted(),
+                HostInput::MalformedRange { address } => self.arm.refuse_range(address),
+                HostInput::Corrupted => self.arm.count_corrupted(),
             }
         }
     }

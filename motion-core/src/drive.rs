@@ -12,7 +12,9 @@
 //!
 //! A waiting joint engages at its measured position or, after a restart of the controller alone, at a near goal that its
 //! servo still holds. Its goal stays there until it has torque, so that the servo does not jump. A silent joint keeps its
-//! set-point, because its servo may still hold there. This file does not know the bus or which joint it drives.
+//! set-point, because its servo may still hold there. A joint that loses its torque waits again. So does one whose servo stops
+//! answering while its torque is pending, unless it was silent before. This file does not know the bus or which joint it
+//! drives.
 
 use protocol_core::time::{Duration, Instant};
 
@@ -43,7 +45,7 @@ enum Engagement {
 /// The target of a joint that engaged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Target {
-    /// The measured position: the joint holds there.
+    /// The angle at which it engaged: the joint holds there.
     Measured,
     /// The target that the host wrote, or the target that the joint had before a silence.
     FromHost,

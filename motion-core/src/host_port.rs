@@ -2,7 +2,7 @@
 //! [D5](protocol_core::decisions#d5), [D14](protocol_core::decisions#d14)).
 //!
 //! ```text
-//!   bytes ──▶ Deframer ──▶ next_event ──▶ writes, damage
+//!   bytes ──▶ Deframer ──▶ next_input ──▶ writes, damage
 //!                              │
 //!                              ▼
 //!                        waiting read ──▶ take_read, once its reply has room ──▶ reply ──▶ frame
@@ -15,7 +15,7 @@
 use protocol_core::registers::map::{FINE_TARGET, PROTECTION_VERSION};
 use protocol_core::registers::{Map, RegisterFile};
 use protocol_core::report_kind::ReportKind;
-use protocol_core::request::{Alarm, Reply, Report, Request};
+use protocol_core::request::{Alarm, Reply, ReportMap21, Request};
 use protocol_core::time::Instant;
 use protocol_core::wire::{Defect, Deframer, FrameBuffer, MIN_LENGTH, ToArm, deframer};
 
@@ -44,7 +44,7 @@ impl Read {
 
 /// A write or a defect in the bytes from the host.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum HostEvent<'a> {
+pub(crate) enum HostInput<'a> {
     /// New values for the registers of a map from `address` on.
     Write { map: Map, address: u8, values: &'a [u8] },
     /// A frame whose range ends beyond address 255.
@@ -100,23 +100,23 @@ impl HostPort {
 
     /// The next write or defect; `None` if there is none, or once a read has its turn. The read then waits for room, and so
     /// do the requests behind it.
-    pub(crate) fn next_event(&mut self) -> Option<HostEvent<'_>> {
+    pub(crate) fn next_input(&mut self) -> Option<HostInput<'_>> {
         if self.waiting_read.is_some() {
             return None;
         }
-        let event = match self.deframer.pull()?.map(Request::from_frame) {
+        let input = match self.deframer.pull()?.map(Request::from_frame) {
             Ok(Request::Read { address, count }) => {
                 self.waiting_read = Some(Read { address, count });
                 return None;
             }
-            Ok(Request::Write { address, values }) => HostEvent::Write { map: Map::V22, address, values },
+            Ok(Request::Write { address, values }) => HostInput::Write { map: Map::V22, address, values },
             Ok(Request::WriteMap21 { address, values }) => {
-                HostEvent::Write { map: Map::V21, address, values }
+                HostInput::Write { map: Map::V21, address, values }
             }
-            Err(Defect::MalformedRange { address }) => HostEvent::MalformedRange { address },
-            Err(Defect::WrongCrc) => HostEvent::Corrupted,
+            Err(Defect::MalformedRange { address }) => HostInput::MalformedRange { address },
+            Err(Defect::WrongCrc) => HostInput::Corrupted,
         };
-        Some(event)
+        Some(input)
     }
 
     /// The waiting read, if its reply fits `room` bytes.
@@ -152,7 +152,7 @@ impl HostPort {
         let values = registers.read(address, count);
         match kind.map() {
             Map::V22 => Reply { address, values }.encode(&mut self.frame),
-            Map::V21 => Report { address, values }.encode(&mut self.frame),
+            Map::V21 => ReportMap21 { address, values }.encode(&mut self.frame),
         }
         &self.frame
     }
@@ -191,7 +191,7 @@ mod tests {
     #[test]
     fn d05_a_read_waits_for_the_room_of_its_own_reply() {
         let mut port = port_with(&[Request::Read { address: 54, count: 7 }]);
-        assert_eq!(port.next_event(), None);
+        assert_eq!(port.next_input(), None);
         assert_eq!(port.take_read(13), None);
         assert_eq!(port.take_read(14), Some(Read { address: 54, count: 7 }));
         assert_eq!(port.take_read(262), None, "only once");
@@ -200,14 +200,14 @@ mod tests {
     #[test]
     fn d05_a_write_waits_only_behind_a_read() {
         let write = Request::Write { address: 46, values: &[90] };
-        let event = Some(HostEvent::Write { map: Map::V22, address: 46, values: &[90] });
-        assert_eq!(port_with(&[write]).next_event(), event);
+        let input = Some(HostInput::Write { map: Map::V22, address: 46, values: &[90] });
+        assert_eq!(port_with(&[write]).next_input(), input);
         let mut port = port_with(&[Request::Read { address: 0, count: 1 }, write]);
-        assert_eq!(port.next_event(), None);
+        assert_eq!(port.next_input(), None);
         assert_eq!(port.take_read(7), None);
         assert_eq!(port.deadline(), Instant::FAR_FUTURE, "only more room has an effect");
         assert!(port.take_read(8).is_some());
-        assert_eq!(port.next_event(), event);
+        assert_eq!(port.next_input(), input);
     }
 
     #[test]
@@ -226,8 +226,8 @@ mod tests {
     #[test]
     fn a_malformed_range_and_a_wrong_crc_are_distinguished() {
         let mut port = port_with(&[Request::Read { address: 250, count: 7 }]);
-        assert_eq!(port.next_event(), Some(HostEvent::MalformedRange { address: 250 }));
+        assert_eq!(port.next_input(), Some(HostInput::MalformedRange { address: 250 }));
         port.bytes(NOW, &[0xAA, 0x77, 3, 0, 0, 1, 2]);
-        assert_eq!(port.next_event(), Some(HostEvent::Corrupted));
+        assert_eq!(port.next_input(), Some(HostInput::Corrupted));
     }
 }

@@ -27,7 +27,7 @@ use crate::calibration::{
 use crate::drive::Drive;
 use crate::goal_check::GoalCheck;
 use crate::let_go::LetGo;
-use crate::obstacle::Obstacle;
+use crate::obstacle::ObstacleWatch;
 use crate::position_filter::{FilterOutcome, PositionFilter};
 use crate::push_limiter::{FULL_LOAD, PushLimit, PushSample};
 use crate::servo_bus::{Answer, Reading, Torque};
@@ -56,7 +56,7 @@ pub(crate) struct JointState {
     servo_velocity: i16,
     /// The load, in 0.1 % of the stall torque, positive towards greater angles.
     load: i16,
-    obstacle: Obstacle,
+    obstacle: ObstacleWatch,
     let_go: LetGo,
     torque: TorqueCheck,
     goal: GoalCheck,
@@ -82,7 +82,7 @@ impl JointState {
             measured: None,
             servo_velocity: 0,
             load: 0,
-            obstacle: Obstacle::NONE,
+            obstacle: ObstacleWatch::NONE,
             let_go: LetGo::NO,
             torque: TorqueCheck::ORDERED,
             goal: GoalCheck::NEW,

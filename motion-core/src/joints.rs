@@ -26,7 +26,7 @@ use crate::servo_bus::{Answer, Question, Torque};
 use crate::supply_watch::SupplyWatch;
 
 /// Shorter than the 200 ms or so for which a restarting servo executes nothing. So a servo that has answered within this
-/// time has not restarted since.
+/// time has not completed a restart since.
 const RESTART_TIME: Duration = Duration::from_millis(180);
 
 /// The seven joints and their motor state.
@@ -326,7 +326,7 @@ impl Joints {
         self.set_of(|state| !state.position.is_known())
     }
 
-    /// The joints whose set-point has not reached its target, bit n-1 for joint n.
+    /// The joints whose set-point has not reached its target, or whose target waits until they engage, bit n-1 for joint n.
     pub(crate) fn moving(&self) -> u8 {
         self.set_of(|state| state.drive.is_moving())
     }

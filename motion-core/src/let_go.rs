@@ -22,8 +22,8 @@ use crate::servo_bus::frame::error::{OVERHEAT, OVERLOAD};
 const FAR: u32 = 3_000_000;
 /// See [`FAR`].
 const FAR_FOR: Duration = Duration::from_millis(200);
-/// Such a joint also counts as freed if it has turned away from its set-point by this much, in millionths of a degree. This
-/// counts from the nearest angle since the alarm.
+/// With an alarm and no load, a joint also counts as freed if it has turned away by this much, in millionths of a degree, from
+/// the angle that was nearest to its set-point since the alarm.
 const TURNED_AWAY: i32 = 1_000_000;
 /// A joint engages anew when its alarm has been gone for this long or, after an overload, when it has been at rest for
 /// this long.

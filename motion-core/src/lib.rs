@@ -4,7 +4,7 @@
 //!   host bytes ──▶ HostPort ──▶ ArmControl ──▶ Joints: Drive, Trajectory ──▶ calibration ──▶ Bus ──▶ servo bytes
 //!                                  │  ▲         Joints: PositionFilter   ◀── calibration ◀── Bus ◀── servo bytes
 //!                                  │  └── BusScheduler selects the next frame of the Bus
-//!   host bytes ◀── HostPort ◀── registers ◀── Joints, Status
+//!   host bytes ◀── HostPort ◀── registers ◀── Joints, ControllerStatus
 //!                                  │
 //!                                  ▼ VacuumControl, settings to save
 //! ```
@@ -85,5 +85,5 @@ pub use protocol_core::settings::Storage;
 pub use servo_bus::TorqueCodes;
 pub use vacuum::Vacuum;
 
-/// The control cycle: every 10 ms the driven joints get new goals, and the servos are read.
+/// The control cycle: every 10 ms the driven joints get new goals, and the servos that answer are read.
 pub const CYCLE: Duration = Duration::from_millis(10);

@@ -12,7 +12,7 @@ use crate::limits::{claw_allows, linkage_allows};
 use crate::reach::Reached;
 
 /// The targets or the set-points that are checked against the limits, one for each joint; `None` for a joint without one.
-pub(crate) type Angles = [Option<MicroDegrees>; JOINTS];
+pub(crate) type AnglesToCheck = [Option<MicroDegrees>; JOINTS];
 
 /// A write that is to be checked.
 #[derive(Clone, Copy)]
@@ -31,7 +31,7 @@ impl LimitCheck<'_> {
 
     /// The lowest register for which a limit refuses the write; `None` if no limit does. `targets` are the targets before the
     /// write, and `set_points` the set-points of the driven joints.
-    pub(crate) fn first_refused(&self, targets: &Angles, set_points: &Angles) -> Option<u8> {
+    pub(crate) fn first_refused(&self, targets: &AnglesToCheck, set_points: &AnglesToCheck) -> Option<u8> {
         let mut after = *targets;
         for (target, joint) in after.iter_mut().zip(Joint::ALL) {
             *target = self.written(joint).or(*target);
@@ -75,12 +75,12 @@ impl LimitCheck<'_> {
 }
 
 /// Do joints 2 and 3 keep the linkage? They do if the angle of one is missing.
-fn linkage_is_kept(angles: &Angles) -> bool {
+fn linkage_is_kept(angles: &AnglesToCheck) -> bool {
     let [_, two, three, ..] = *angles;
     two.zip(three).is_none_or(|(two, three)| linkage_allows(two, three))
 }
 
-fn claw_is_kept(angles: &Angles) -> bool {
+fn claw_is_kept(angles: &AnglesToCheck) -> bool {
     let [.., seven] = *angles;
     seven.is_none_or(claw_allows)
 }

@@ -27,7 +27,7 @@ pub(crate) struct HeldBack {
 
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub(crate) struct Obstacle {
+pub(crate) struct ObstacleWatch {
     limiter: PushLimiter,
     /// For how many control cycles the joint has been held back without coming nearer to its target, and its distance
     /// from the target when these cycles began, in millionths of a degree. The time of a late call does not count: the joint
@@ -38,7 +38,7 @@ pub(crate) struct Obstacle {
     retrying_since: Option<Instant>,
 }
 
-impl Obstacle {
+impl ObstacleWatch {
     pub(crate) const NONE: Self =
         Self { limiter: PushLimiter::FREE, held: None, is_blocked: false, retrying_since: None };
 

@@ -25,7 +25,7 @@ const LATE_DIVISOR: u64 = 8;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-struct Point {
+struct DuePoint {
     due: Instant,
     angle: MicroDegrees,
 }
@@ -35,7 +35,7 @@ struct Point {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PointStream {
     /// The oldest first.
-    points: Vec<Point, CAPACITY>,
+    points: Vec<DuePoint, CAPACITY>,
     /// When the newest point is or was due.
     last_due: Instant,
 }
@@ -67,7 +67,7 @@ impl PointStream {
             self.pass(1);
         }
         // There is room.
-        let _ = self.points.push(Point { due, angle });
+        let _ = self.points.push(DuePoint { due, angle });
         self.last_due = due;
     }
 

@@ -19,8 +19,8 @@ const RETRY_AFTER: Duration = Duration::from_millis(90);
 /// How long the measured position of a joint without torque is valid: two control cycles. A falling joint moves by
 /// about 2 degrees meanwhile.
 const FRESH_FOR: Duration = Duration::from_millis(20);
-/// The highest speed of a joint: 372 degrees/s ([D10](protocol_core::decisions#d10)) are 1757 counts per second. A hand can
-/// be slightly faster.
+/// The highest speed of a joint: 372 degrees/s ([D10](protocol_core::decisions#d10)) are at most 1757 counts per second. A
+/// hand can be slightly faster.
 const COUNTS_PER_SECOND: u32 = 2_000;
 /// A joint that sinks this slowly counts as steady. Otherwise a joint whose servo is seldom read would engage only when it lies
 /// at the bottom.

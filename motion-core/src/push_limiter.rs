@@ -53,8 +53,8 @@ const FULL_LOAD_DISTANCE: i32 = 4_300_000;
 pub(crate) const FULL_LOAD: i16 = 950;
 /// How far the push may exceed the limit while a joint sinks slowly ([D27](protocol_core::decisions#d27)).
 const TOLERANCE: i16 = 50;
-/// The speed at which the bound retreats while the push is within the tolerance, in micro-degrees per millisecond. Goals are
-/// whole counts, so with 8 degrees/s the joint sinks at 10 degrees/s at most ([D27](protocol_core::decisions#d27)).
+/// The highest speed at which the bound retreats while the push is within the tolerance, in micro-degrees per millisecond.
+/// Goals are whole counts, so with 8 degrees/s the joint sinks at 10 degrees/s at most ([D27](protocol_core::decisions#d27)).
 const SINK_PER_MILLISECOND: i32 = 8_000;
 /// The distance may grow again when the push is this far under the limit; with a limit under twice this, when the push
 /// is under half the limit.

@@ -14,13 +14,13 @@ const ALL_JOINTS: u8 = 0x7F;
 /// The part of the status block that does not come from the joints.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub(crate) struct Status {
+pub(crate) struct ControllerStatus {
     storage: Storage,
-    /// Fault bits that stay until the next restart, or until [`Status::clear_faults`].
+    /// Fault bits that stay until the next restart, or until [`ControllerStatus::clear_faults`].
     lasting_faults: u8,
 }
 
-impl Status {
+impl ControllerStatus {
     /// The state of the settings storage, and the fault bits known at start.
     pub(crate) const fn new(storage: Storage, faults: u8) -> Self {
         Self { storage, lasting_faults: faults }
@@ -36,7 +36,7 @@ impl Status {
         self.storage = storage;
     }
 
-    /// Raises fault bits. They stay until the next restart, or until [`Status::clear_faults`].
+    /// Raises fault bits. They stay until the next restart, or until [`ControllerStatus::clear_faults`].
     pub(crate) const fn raise_faults(&mut self, bits: u8) {
         self.lasting_faults |= bits;
     }
@@ -88,7 +88,7 @@ mod tests {
     #[test]
     fn servos_count_as_silent_only_after_start_up() {
         let (mut registers, joints) = (RegisterFile::new([0; 6], None), Joints::new(MotorState::Servo));
-        let status = Status::new(Storage::Ready, 0);
+        let status = ControllerStatus::new(Storage::Ready, 0);
         registers.set(SUPPLY_VOLTAGE.address, 74);
         status.show_servos(&mut registers, &joints, true);
         assert_eq!(registers.read(FAULTS.address, 2), [0, 0]);
@@ -101,7 +101,7 @@ mod tests {
     #[test]
     fn lasting_faults_stay_beside_the_storage_fault() {
         let (mut registers, joints) = (RegisterFile::new([0; 6], None), Joints::new(MotorState::Servo));
-        let mut status = Status::new(Storage::Broken, fault::WATCHDOG_RESTART);
+        let mut status = ControllerStatus::new(Storage::Broken, fault::WATCHDOG_RESTART);
         status.raise_faults(fault::RECEIVE_OVERRUN);
         status.show_faults(&mut registers, &joints);
         let lasting = fault::WATCHDOG_RESTART | fault::RECEIVE_OVERRUN;
@@ -114,7 +114,7 @@ mod tests {
     #[test]
     fn a_refusal_shows_its_reason_and_its_register() {
         let mut registers = RegisterFile::new([0; 6], None);
-        Status::refuse(&mut registers, refusal::OUT_OF_RANGE, 46);
+        ControllerStatus::refuse(&mut registers, refusal::OUT_OF_RANGE, 46);
         assert_eq!(registers.read(LAST_REFUSAL.address, 2), [refusal::OUT_OF_RANGE, 46]);
         assert_eq!(registers.get(FRAMES_REFUSED.address), 1);
     }

@@ -11,8 +11,8 @@
 
 use protocol_core::time::{Duration, Instant};
 
-/// The shortest silence of all driven servos that may be a lost supply. After a shorter one, each joint engages where it is
-/// measured.
+/// The shortest silence of all driven servos that may be a lost supply. After a shorter one, each joint whose servo
+/// restarted engages where it is measured.
 const LOST_AFTER: Duration = Duration::from_millis(1_000);
 
 /// Watches the supply of the servos.

@@ -21,7 +21,8 @@ enum Known {
     Ordered,
     /// The last read that is trusted showed the switch on.
     On,
-    /// A question was not answered since the switch was read, or the servo was not heard for long.
+    /// Since the switch was read, a question was not answered, an answer was processed late, or the servo was not heard for
+    /// long.
     Doubtful,
 }
 
@@ -31,7 +32,7 @@ pub(crate) enum TorqueFound {
     AsBefore,
     /// The order to switch torque on was lost.
     OrderLost,
-    /// The switch is off although it was on.
+    /// The switch is off. It was on, or a question was not answered since the order.
     Lost,
 }
 

@@ -4,7 +4,7 @@
 //!   host                                   arm
 //!   Request::encode ──▶ Frame ──▶ Request::from_frame
 //!   Reply::from_frame ◀── Frame ◀── Reply::encode
-//!   Report, Alarm     ◀── Frame ◀── without a request
+//!   ReportMap21, Alarm ◀─ Frame ◀── without a request
 //! ```
 //!
 //! This file knows neither streams of bytes nor the meaning of registers.
@@ -93,14 +93,14 @@ impl<'a> Reply<'a> {
 /// A report in map 2.1, which the arm sends without a request ([M4](crate::decisions#m4)).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Report<'a> {
+pub struct ReportMap21<'a> {
     /// The first register.
     pub address: u8,
     /// The values, one byte per register, at most 255.
     pub values: &'a [u8],
 }
 
-impl<'a> Report<'a> {
+impl<'a> ReportMap21<'a> {
     /// The report of map 2.1 in a frame that the host received; `None` for any other frame, also for a report of map 2.2.
     #[must_use]
     pub const fn from_frame(frame: Frame<'a>) -> Option<Self> {

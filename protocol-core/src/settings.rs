@@ -15,7 +15,7 @@ pub enum Storage {
     /// The storage is full until the next restart. Writes that change a setting are refused
     /// ([D19](crate::decisions#d19)).
     Full,
-    /// The storage does not keep data. Settings live in RAM only.
+    /// The storage does not keep data. New settings live in RAM only.
     Broken,
 }
 

@@ -3,7 +3,8 @@
     async with sevenbot.aio.Arm.simulated() as arm:
         await arm.pose(120, 90, 65, 90, 90, 90, 80)
 
-One thread of each arm waits for its calls, so that they run in order. A cancelled call makes the arm hold.
+One thread of each arm waits for its calls, so that they run in order, except `stop`, `close` and `is_connected`. If a call of
+this thread is cancelled, the arm holds.
 """
 
 from __future__ import annotations

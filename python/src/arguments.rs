@@ -16,9 +16,9 @@ const WHAT_ANGLES: &str =
     "angles are seven numbers, or one list or array of seven, with None for a joint that stays";
 
 /// Angles of a pose: a number for each joint, or `None` for a joint that stays.
-pub(crate) struct Goals([Option<f64>; 7]);
+pub(crate) struct PoseGoals([Option<f64>; 7]);
 
-impl<'py> FromPyObject<'_, 'py> for Goals {
+impl<'py> FromPyObject<'_, 'py> for PoseGoals {
     type Error = PyErr;
 
     fn extract(angles: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
@@ -36,7 +36,7 @@ impl<'py> FromPyObject<'_, 'py> for Goals {
     }
 }
 
-impl Goals {
+impl PoseGoals {
     /// Seven angles, or one list of seven.
     pub(crate) fn of(angles: &Bound<'_, PyTuple>) -> PyResult<Self> {
         match angles.len() {
@@ -73,16 +73,16 @@ pub(crate) fn angle(py: Python<'_>, of: &str, degrees: f64) -> PyResult<FineAngl
 }
 
 /// The direction of a tool.
-pub(crate) struct Direction(Vector);
+pub(crate) struct ToolDirection(Vector);
 
-impl Direction {
+impl ToolDirection {
     /// Straight down if none is given.
     pub(crate) fn or_down(direction: Option<Self>) -> Vector {
         direction.map_or(DOWN, |Self(direction)| direction)
     }
 }
 
-impl<'py> FromPyObject<'_, 'py> for Direction {
+impl<'py> FromPyObject<'_, 'py> for ToolDirection {
     type Error = PyErr;
 
     fn extract(direction: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {

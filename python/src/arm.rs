@@ -9,13 +9,13 @@ use sevenbot::cartesian::{TipTarget, Vector};
 use sevenbot::map::motor_state;
 use sevenbot::moves::JointMove;
 
-use crate::arguments::{self, Direction, Goals, OpenArguments, PortName, pace, whole};
+use crate::arguments::{self, OpenArguments, PortName, PoseGoals, ToolDirection, pace, whole};
 use crate::bulk;
 use crate::errors::{InvalidType, NotServed, raised, without_attribute};
-use crate::motion::{self, PlayOptions, RecordOptions, TipWish};
-use crate::numbers::{Angles, Values, duration, seed};
-use crate::observation::{Answer, Observation, monotonic};
-use crate::opening::{self, Opened};
+use crate::motion::{self, PlayOptions, RecordOptions, TipRequest};
+use crate::numbers::{PoseDegrees, Values, duration, seed};
+use crate::observation::{JointReadings, Observation, monotonic};
+use crate::opening::{self, ArmFacts};
 use crate::ports::{self, Wanted};
 use crate::recording::Recording;
 use crate::registers::{self, Registers, Shown};
@@ -41,7 +41,7 @@ pub(crate) struct Arm {
     simulation: Option<Simulation>,
     /// The move that `wait` waits for.
     sent: Mutex<Option<Arc<JointMove>>>,
-    opened: Opened,
+    facts: ArmFacts,
 }
 
 #[expect(clippy::too_many_arguments, reason = "keywords in Python")]
@@ -64,7 +64,7 @@ impl Arm {
         let wanted = Wanted::of(py, id, chip)?;
         let port = wanted.port(py, port, options.baud)?;
         let token = ports::token(py, &port, token)?;
-        opening::port(py, &port, token, options).map(|(worker, opened)| Self::of(worker, opened, None))
+        opening::port(py, &port, token, options).map(|(worker, facts)| Self::of(worker, facts, None))
     }
 
     /// An arm in virtual time. The same calls give the same values on every machine.
@@ -82,9 +82,9 @@ impl Arm {
     ) -> PyResult<Py<SimulatedArm>> {
         let options = OpenArguments { baud: 115_200, timeout, attempts, map }.options(py)?;
         let seed = seed.map_or(Ok(1), self::seed)?;
-        let (worker, opened, simulation) = opening::simulated(py, seed, options)?;
+        let (worker, facts, simulation) = opening::simulated(py, seed, options)?;
         let simulation = Simulation::of(simulation);
-        SimulatedArm::of(py, Self::of(worker, opened, Some(simulation.clone())), simulation)
+        SimulatedArm::of(py, Self::of(worker, facts, Some(simulation.clone())), simulation)
     }
 
     /// The simulation behind this arm; `None` for a real one.
@@ -96,25 +96,25 @@ impl Arm {
     /// The name of the port.
     #[getter]
     fn port(&self) -> &str {
-        &self.opened.port
+        &self.facts.port
     }
 
     /// The firmware's version, such as `"3.0"`.
     #[getter]
     fn firmware(&self) -> &str {
-        &self.opened.firmware
+        &self.facts.firmware
     }
 
     /// The chip's unique number, twelve hexadecimal digits.
     #[getter]
     fn chip_id(&self) -> &str {
-        &self.opened.chip
+        &self.facts.chip
     }
 
     /// The register map of the frames, `"2.1"` or `"2.2"`. Names and addresses are those of map 2.2 with both.
     #[getter]
     fn map(&self) -> &str {
-        self.opened.map
+        self.facts.map
     }
 
     /// Whether a long call shows its progress on a terminal. `True` at first.
@@ -131,7 +131,7 @@ impl Arm {
     /// The registers as a mapping: `arm.registers["speed.1"] = 10`.
     #[getter]
     fn registers(&self) -> Registers {
-        Registers::of(Arc::clone(&self.worker), Arc::clone(&self.opened.names))
+        Registers::of(Arc::clone(&self.worker), Arc::clone(&self.facts.names))
     }
 
     #[doc = include_str!("arm/help/get.txt")]
@@ -147,7 +147,7 @@ impl Arm {
 
     #[doc = include_str!("arm/help/angles.txt")]
     #[getter]
-    fn angles(&self, py: Python<'_>) -> PyResult<Angles> {
+    fn angles(&self, py: Python<'_>) -> PyResult<PoseDegrees> {
         let read =
             self.worker.read(py, motion::known_angles).map_err(|error| without_attribute(py, error))?;
         Ok(raised(py, read)?.into())
@@ -156,7 +156,7 @@ impl Arm {
     #[doc = include_str!("arm/help/observe.txt")]
     fn observe(&self, py: Python<'_>) -> PyResult<Observation> {
         let asked = monotonic(py)?;
-        let read = raised(py, self.worker.read(py, Answer::read)?)?;
+        let read = raised(py, self.worker.read(py, JointReadings::read)?)?;
         let served =
             read.ok_or_else(|| NotServed::of_arm(py, "positions in hundredths, velocities and loads"));
         served?.observation(py, asked)
@@ -199,8 +199,8 @@ impl Arm {
         wait: bool,
         table: Option<f64>,
         guard: bool,
-    ) -> PyResult<Option<Angles>> {
-        let (targets, pace) = (Goals::of(angles)?.targets(py)?, pace(py, speed, duration)?);
+    ) -> PyResult<Option<PoseDegrees>> {
+        let (targets, pace) = (PoseGoals::of(angles)?.targets(py)?, pace(py, speed, duration)?);
         self.warn_of_way(py, targets, pace, arguments::guard(py, table, guard)?)?;
         self.go(py, targets, pace, wait)
     }
@@ -214,27 +214,27 @@ impl Arm {
         x: f64,
         y: f64,
         z: f64,
-        tool: Option<Direction>,
+        tool: Option<ToolDirection>,
         speed: Option<f64>,
         duration: Option<f64>,
         wait: bool,
         straight: bool,
         table: Option<f64>,
         guard: bool,
-    ) -> PyResult<Option<Angles>> {
-        let (tip, tool) = (Vector::new(x, y, z), Direction::or_down(tool));
+    ) -> PyResult<Option<PoseDegrees>> {
+        let (tip, tool) = (Vector::new(x, y, z), ToolDirection::or_down(tool));
         let guard = arguments::guard(py, table, guard)?;
         if straight {
             let pace = arguments::line_pace(py, speed, duration)?;
-            return self.move_straight(py, TipWish { tip, tool, guard }, pace, wait).map(Some);
+            return self.move_straight(py, TipRequest { tip, tool, guard }, pace, wait).map(Some);
         }
         let pace = pace(py, speed, duration)?;
         let target = raised(py, TipTarget::guarded(tip, tool, guard.as_ref()))?;
-        self.go_to_tip(py, TipWish { tip, tool, guard }, target, pace, wait)
+        self.go_to_tip(py, TipRequest { tip, tool, guard }, target, pace, wait)
     }
 
     #[doc = include_str!("arm/help/wait.txt")]
-    fn wait(&self, py: Python<'_>) -> PyResult<Option<Angles>> {
+    fn wait(&self, py: Python<'_>) -> PyResult<Option<PoseDegrees>> {
         let Some(sent) = lock(&self.sent).take() else { return Ok(None) };
         let finished = self.worker.call(py, move |arm, watch| motion::finish(arm, &sent, watch))?;
         Ok(Some(raised(py, finished)?.into()))
@@ -262,8 +262,8 @@ impl Arm {
 
     #[doc = include_str!("arm/help/park.txt")]
     #[pyo3(signature = (*angles, keep = false))]
-    fn park(&self, py: Python<'_>, angles: &Bound<'_, PyTuple>, keep: bool) -> PyResult<Angles> {
-        let pose = if angles.is_empty() { None } else { Some(Goals::of(angles)?.targets(py)?) };
+    fn park(&self, py: Python<'_>, angles: &Bound<'_, PyTuple>, keep: bool) -> PyResult<PoseDegrees> {
+        let pose = if angles.is_empty() { None } else { Some(PoseGoals::of(angles)?.targets(py)?) };
         if keep && pose.is_none() {
             return Err(InvalidType::raise(py, "keep=True needs seven angles"));
         }
@@ -350,7 +350,7 @@ impl Arm {
 
     fn __repr__(&self) -> String {
         let state = if self.worker.is_open() { "" } else { ", closed" };
-        let Opened { port, firmware, map, .. } = &self.opened;
+        let ArmFacts { port, firmware, map, .. } = &self.facts;
         format!("<Arm at {port}, firmware {firmware}, map {map}{state}>")
     }
 }

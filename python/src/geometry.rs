@@ -6,7 +6,7 @@ use pyo3::types::PyTuple;
 use sevenbot::Joint;
 use sevenbot::cartesian::{TipTarget, Vector};
 
-use crate::arguments::{Direction, Goals};
+use crate::arguments::{PoseGoals, ToolDirection};
 use crate::bulk;
 use crate::errors::{InvalidValue, raised};
 use crate::tip::Tip;
@@ -15,7 +15,7 @@ use crate::tip::Tip;
 #[pyfunction]
 #[pyo3(signature = (*angles))]
 pub(crate) fn forward(py: Python<'_>, angles: &Bound<'_, PyTuple>) -> PyResult<Tip> {
-    Ok(Tip::at(Goals::of(angles)?.all(py)?))
+    Ok(Tip::at(PoseGoals::of(angles)?.all(py)?))
 }
 
 /// The angles of joints 1 to 5 in degrees that bring the tip to x, y, z in millimetres, with the tool in this direction, by
@@ -29,9 +29,9 @@ pub(crate) fn inverse(
     x: f64,
     y: f64,
     z: f64,
-    tool: Option<Direction>,
+    tool: Option<ToolDirection>,
 ) -> PyResult<Bound<'_, PyAny>> {
-    let target = TipTarget::guarded(Vector::new(x, y, z), Direction::or_down(tool), None);
+    let target = TipTarget::guarded(Vector::new(x, y, z), ToolDirection::or_down(tool), None);
     bulk::numbers(py, &raised(py, target)?.angles)
 }
 

@@ -10,10 +10,10 @@ use sevenbot::stream::LatestCounts;
 
 /// The newest action of a program, and the counts and the failure of earlier ones.
 #[derive(Debug, Default)]
-pub(crate) struct LatestSlot(Mutex<Slot>);
+pub(crate) struct LatestSlot(Mutex<LatestState>);
 
 #[derive(Debug, Default)]
-struct Slot {
+struct LatestState {
     is_open: bool,
     /// The newest action until the thread of the port takes it.
     action: Option<FineTargets>,
@@ -26,7 +26,7 @@ struct Slot {
     pose: [f64; 7],
 }
 
-impl Slot {
+impl LatestState {
     fn counts(&self) -> LatestCounts {
         LatestCounts { skipped: self.counts.skipped + self.skipped, ..self.counts }
     }
@@ -40,13 +40,13 @@ pub(crate) struct Told {
 }
 
 impl LatestSlot {
-    fn slot(&self) -> MutexGuard<'_, Slot> {
+    fn slot(&self) -> MutexGuard<'_, LatestState> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Opens the slot for a stream that begins at this pose. Drops actions, counts and failures of an earlier stream.
     pub(crate) fn open(&self, pose: [f64; 7]) {
-        *self.slot() = Slot { is_open: true, pose, ..Slot::default() };
+        *self.slot() = LatestState { is_open: true, pose, ..LatestState::default() };
     }
 
     /// Closes the slot at the end of a stream. The counts stay.

@@ -27,7 +27,7 @@ const SHORTEST_LINE: f64 = 0.5;
 
 /// The requested tip and direction of the tool, and the guard; `None`: no guard.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct TipWish {
+pub(crate) struct TipRequest {
     pub(crate) tip: Vector,
     pub(crate) tool: Vector,
     pub(crate) guard: Option<Guard>,
@@ -113,10 +113,10 @@ pub(crate) fn breach_on_way(
 /// A straight line from the present targets, as a recording.
 pub(crate) fn straight_line(
     arm: &mut Arm,
-    wish: TipWish,
+    request: TipRequest,
     pace: LinePace,
 ) -> Result<Recording, StraightMoveError> {
-    let TipWish { tip, tool, guard } = wish;
+    let TipRequest { tip, tool, guard } = request;
     let joints = arm.driven_joints()?;
     let start = LineStart::of(arm, &joints)?;
     let speed = match pace {
@@ -212,7 +212,7 @@ pub(crate) struct RecordOptions {
 }
 
 #[derive(Debug, Default)]
-pub(crate) struct Recorded {
+pub(crate) struct RecordedText {
     pub(crate) text: String,
     /// When each moment arrived here, in seconds since the first.
     pub(crate) arrivals: Vec<f64>,
@@ -223,14 +223,14 @@ pub(crate) fn record(
     arm: &mut Arm,
     options: RecordOptions,
     watch: &mut Watch<'_>,
-) -> (Recorded, Result<(), MoveError>) {
-    let mut done = Recorded::default();
+) -> (RecordedText, Result<(), MoveError>) {
+    let mut done = RecordedText::default();
     let outcome = record_into(&mut done, arm, options, watch);
     (done, outcome)
 }
 
 fn record_into(
-    done: &mut Recorded,
+    done: &mut RecordedText,
     arm: &mut Arm,
     options: RecordOptions,
     watch: &mut Watch<'_>,
@@ -257,7 +257,7 @@ fn record_into(
 }
 
 fn record_reports(
-    done: &mut Recorded,
+    done: &mut RecordedText,
     arm: &mut Arm,
     options: RecordOptions,
     content: u8,

@@ -8,7 +8,7 @@ use pyo3::types::{PyByteArray, PyBytes, PyDict, PyFrozenSet, PySet, PyString};
 
 use crate::errors::{InvalidType, InvalidValue};
 
-pub(crate) type Angles = (f64, f64, f64, f64, f64, f64, f64);
+pub(crate) type PoseDegrees = (f64, f64, f64, f64, f64, f64, f64);
 
 /// The most rows that are read: many more than a recording has.
 const MOST_ROWS: usize = 10_000_000;

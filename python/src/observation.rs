@@ -7,7 +7,7 @@ use sevenbot::fine::FineState;
 use sevenbot::{Arm, Error, FineAngle};
 
 use crate::bulk;
-use crate::numbers::Angles;
+use crate::numbers::PoseDegrees;
 
 /// What one read of the arm tells: positions, velocities and loads of all joints, measured in the same cycle of the controller.
 ///
@@ -24,21 +24,21 @@ pub(crate) struct Observation {
 }
 
 /// The arguments of [`Observation::_of`]: positions, velocities, loads, time, age and `monotonic`.
-type Pickled = (Angles, Angles, Angles, f64, f64, f64);
+type PickledObservation = (PoseDegrees, PoseDegrees, PoseDegrees, f64, f64, f64);
 
 /// A cycle of the controller, in seconds.
 const CYCLE: f64 = 0.01;
 
 /// The answer of the arm, read without the interpreter.
-pub(crate) struct Answer {
+pub(crate) struct JointReadings {
     state: FineState,
     time: f64,
     age: f64,
     came: Instant,
 }
 
-impl Answer {
-    /// Reads positions, velocities and loads; `None` if the firmware does not have the extended block.
+impl JointReadings {
+    /// Reads positions, velocities and loads; `None` with the maker's firmware or map 2.1.
     pub(crate) fn read(arm: &mut Arm) -> Result<Option<Self>, Error> {
         let before = arm.elapsed();
         let Some(state) = arm.fine_state_if_served()? else { return Ok(None) };
@@ -121,7 +121,7 @@ impl Observation {
         Self { positions, velocities, loads, time, age, monotonic }
     }
 
-    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Pickled)> {
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, PickledObservation)> {
         let (positions, velocities, loads) =
             (self.positions.into(), self.velocities.into(), self.loads.into());
         let arguments = (positions, velocities, loads, self.time, self.age, self.monotonic);
@@ -129,7 +129,7 @@ impl Observation {
     }
 
     fn __repr__(&self) -> String {
-        let angles: Angles = self.positions.into();
+        let angles: PoseDegrees = self.positions.into();
         format!("<Observation at {:.3} s: {angles:?}>", self.time)
     }
 }

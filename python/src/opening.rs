@@ -16,7 +16,7 @@ use crate::registers::readable_names;
 use crate::worker::{SIGNAL_PERIOD, Worker};
 
 /// Facts that are read from an arm when it is opened.
-pub(crate) struct Opened {
+pub(crate) struct ArmFacts {
     pub(crate) port: String,
     pub(crate) firmware: String,
     pub(crate) chip: String,
@@ -25,7 +25,7 @@ pub(crate) struct Opened {
     pub(crate) names: Arc<[String]>,
 }
 
-impl Opened {
+impl ArmFacts {
     fn of(arm: &mut sevenbot::Arm) -> Self {
         Self {
             port: arm.port().to_owned(),
@@ -43,14 +43,14 @@ pub(crate) fn port(
     port: &str,
     token: Option<String>,
     options: ArmOptions,
-) -> PyResult<(Worker, Opened)> {
+) -> PyResult<(Worker, ArmFacts)> {
     let name = port.to_owned();
     let open = move |is_cancelled| {
         let line = open_line_with_token(&name, options.baud, token.as_deref())?;
         let line = CancellableLine { line, is_cancelled };
         sevenbot::Arm::over(Box::new(line), &name, options)
     };
-    Worker::start(py, Box::new(open), Opened::of)?.map_err(|why| not_opened(py, port, &why))
+    Worker::start(py, Box::new(open), ArmFacts::of)?.map_err(|why| not_opened(py, port, &why))
 }
 
 /// Opens an arm in virtual time.
@@ -58,17 +58,17 @@ pub(crate) fn simulated(
     py: Python<'_>,
     seed: u64,
     options: ArmOptions,
-) -> PyResult<(Worker, Opened, SharedSimulation)> {
+) -> PyResult<(Worker, ArmFacts, SharedSimulation)> {
     let simulation = SharedSimulation::new(Simulation::new(SimulationConfig::default()));
     let line = simulation.line();
     let open = move |_| sevenbot::Arm::over(Box::new(line), "simulated", options);
-    let opened = Worker::start(py, Box::new(open), Opened::of)?;
+    let opened = Worker::start(py, Box::new(open), ArmFacts::of)?;
     let (worker, opened) = opened.map_err(|why: OpenError| not_opened(py, "simulated", &why))?;
     simulation.with(|simulation| simulation.set_seed(seed));
     Ok((worker, opened, simulation))
 }
 
-/// A line whose waits end early when the opening of the arm was cancelled.
+/// A line whose waits for bytes end early when the opening of the arm was cancelled.
 #[derive(Debug)]
 struct CancellableLine {
     line: Box<dyn HostLine>,

@@ -12,9 +12,9 @@ const MOST_ARMS: usize = 8_192;
 static OPEN_ARMS: AtomicUsize = AtomicUsize::new(0);
 
 /// The right to one of [`MOST_ARMS`] arms. Dropping it frees the place.
-pub(crate) struct Place;
+pub(crate) struct ArmPlace;
 
-impl Place {
+impl ArmPlace {
     pub(crate) fn take(py: Python<'_>) -> PyResult<Self> {
         let place = Self;
         if OPEN_ARMS.fetch_add(1, Ordering::Relaxed) < MOST_ARMS {
@@ -24,7 +24,7 @@ impl Place {
     }
 }
 
-impl Drop for Place {
+impl Drop for ArmPlace {
     fn drop(&mut self) {
         OPEN_ARMS.fetch_sub(1, Ordering::Relaxed);
     }

@@ -13,7 +13,7 @@ use sevenbot::whole_file;
 
 use crate::bulk;
 use crate::errors::{InvalidType, InvalidValue, file_error, raised};
-use crate::numbers::{Angles, Numbers, Rows, elements};
+use crate::numbers::{Numbers, PoseDegrees, Rows, elements};
 
 /// A movement: times in seconds, angles of joints 1 to 7 in degrees, and the vacuum pump.
 ///
@@ -47,10 +47,10 @@ impl Recording {
 }
 
 /// The arguments of [`Recording::parse`].
-type Pickled = (String, Option<Vec<f64>>);
+type PickledRecording = (String, Option<Vec<f64>>);
 
 /// A moment in Python: time, angles, pump.
-fn told(moment: Moment) -> (f64, Angles, bool) {
+fn told(moment: Moment) -> (f64, PoseDegrees, bool) {
     (moment.time.as_secs_f64(), moment.pose.map(sevenbot::FineAngle::degrees).into(), moment.vacuum)
 }
 
@@ -200,7 +200,7 @@ impl Recording {
         hasher.finish()
     }
 
-    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Pickled)> {
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, PickledRecording)> {
         Ok((py.get_type::<Self>().getattr("parse")?, (self.__str__(), self.arrivals.clone())))
     }
 
@@ -214,7 +214,8 @@ impl Recording {
 }
 
 impl Recording {
-    /// Each `step`-th moment from `start` on, `length` moments at most. Fails for a negative step, because time goes forward.
+    /// Each `step`-th moment from `start` on, `length` moments at most. Fails for a negative step, because time goes forward,
+    /// and if no moment is left.
     fn part(&self, py: Python<'_>, (start, step): (isize, isize), length: usize) -> PyResult<Self> {
         let (Ok(start), Ok(step @ 1..)) = (usize::try_from(start), usize::try_from(step)) else {
             return Err(InvalidValue::raise(py, "a part of a recording goes forward: use a positive step"));

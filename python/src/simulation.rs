@@ -17,7 +17,7 @@ use sevenbot::simulated::SharedSimulation;
 
 use crate::arguments::{angle, whole};
 use crate::errors::{Closed, InvalidValue, without_attribute};
-use crate::numbers::{Angles, duration};
+use crate::numbers::{PoseDegrees, duration};
 use crate::worker::lock;
 
 /// Virtual time between two checks of Python's signals. It takes some tens of milliseconds of processor time.
@@ -169,7 +169,7 @@ impl Simulation {
 
     /// The true angles of joints 1 to 7 in degrees, without offsets and without noise.
     #[getter]
-    fn angles(&self, py: Python<'_>) -> PyResult<Angles> {
+    fn angles(&self, py: Python<'_>) -> PyResult<PoseDegrees> {
         let angles = self.with(py, |simulation| Joint::ALL.map(|joint| simulation.plant().angle(joint)));
         let angles = angles.map_err(|error| without_attribute(py, error))?;
         Ok(angles.map(|angle| f64::from(angle) / 1_000.0).into())

@@ -13,7 +13,7 @@ use sevenbot::moves::{MoveError, Observer};
 use sevenbot::simulated::SharedSimulation;
 use sevenbot::stream::{StreamError, StreamOptions, StreamPace};
 
-use crate::arguments::Goals;
+use crate::arguments::PoseGoals;
 use crate::errors::{Closed, raised, warn_of};
 use crate::latest::LatestSlot;
 use crate::stream_counts::StreamCounts;
@@ -196,7 +196,7 @@ impl Stream {
     /// second; else `TooFar` is raised, unless the stream has an `approach`. Then the call takes that time. The first point below
     /// the table or in the base gives a `GuardWarning`. After `Simulation.restore`, and after a failure of the whole arm, such as a
     /// restart, the next point is a first one again.
-    fn send(&self, py: Python<'_>, angles: Goals) -> PyResult<u32> {
+    fn send(&self, py: Python<'_>, angles: PoseGoals) -> PyResult<u32> {
         let point = angles.targets(py)?;
         self.check_open(py)?;
         let sent = self.worker.stream_call(py, move |open, watch| {
@@ -219,7 +219,7 @@ impl Stream {
     /// After all other failures, and after `Arm.stop` (`Interrupted`), it begins again with the next action. This is a first one,
     /// as of `send`, and so is the next one after the watchdog has acted. A simulated arm sends while its time passes: in
     /// `Arm.sleep`, or when the arm is asked. `record`, `sample` and moves hold the sender up.
-    fn latest(&self, py: Python<'_>, angles: Goals) -> PyResult<StreamCounts> {
+    fn latest(&self, py: Python<'_>, angles: PoseGoals) -> PyResult<StreamCounts> {
         let action = angles.targets(py)?;
         let told = self.slot.offer(&action).ok_or_else(|| Closed::raise_no_stream(py))?;
         let told = raised(py, told)?;

@@ -27,7 +27,7 @@ impl From<LatestCounts> for StreamCounts {
 }
 
 /// The arguments of [`StreamCounts::_of`].
-type Pickled = (u32, u32, u32, u32, u32);
+type PickledCounts = (u32, u32, u32, u32, u32);
 
 #[pymethods]
 impl StreamCounts {
@@ -37,7 +37,7 @@ impl StreamCounts {
         Self { sent, skipped, repeated, missed, watchdog }
     }
 
-    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Pickled)> {
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, PickledCounts)> {
         let arguments = (self.sent, self.skipped, self.repeated, self.missed, self.watchdog);
         Ok((py.get_type::<Self>().getattr("_of")?, arguments))
     }

@@ -6,8 +6,8 @@ use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 use sevenbot::cartesian::{DirectionText, PointText, TipPose, Vector};
 
-use crate::arguments::Goals;
-use crate::numbers::Angles;
+use crate::arguments::PoseGoals;
+use crate::numbers::PoseDegrees;
 
 /// Where the arm is.
 ///
@@ -43,7 +43,7 @@ impl Tip {
     #[staticmethod]
     #[pyo3(signature = (*angles))]
     fn of(py: Python<'_>, angles: &Bound<'_, PyTuple>) -> PyResult<Self> {
-        Ok(Self::at(Goals::of(angles)?.all(py)?))
+        Ok(Self::at(PoseGoals::of(angles)?.all(py)?))
     }
 
     /// The tip in millimetres: x, y, z.
@@ -66,7 +66,7 @@ impl Tip {
 
     /// The angles of joints 1 to 7 in degrees.
     #[getter]
-    fn angles(&self) -> Angles {
+    fn angles(&self) -> PoseDegrees {
         self.angles.into()
     }
 
@@ -81,7 +81,7 @@ impl Tip {
         hasher.finish()
     }
 
-    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Angles)> {
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, PoseDegrees)> {
         Ok((py.get_type::<Self>().getattr("of")?, self.angles.into()))
     }
 

@@ -96,7 +96,7 @@ type StreamCall = Box<dyn FnOnce(&mut PacedStream<'_>, &Inbox) + Send>;
 type StreamResult = SyncSender<Result<(), StreamError>>;
 
 /// What the thread of the port shall do.
-pub(crate) enum Message {
+pub(crate) enum PortMessage {
     Call(ArmCall),
     /// A short read, which changes nothing.
     Read(ArmCall),
@@ -156,41 +156,41 @@ impl CallState {
 
 /// The messages to the thread of the port.
 pub(crate) struct Inbox {
-    messages: Receiver<Message>,
+    messages: Receiver<PortMessage>,
     /// The messages that came during a call and are not reads, oldest first.
-    deferred: RefCell<VecDeque<Message>>,
+    deferred: RefCell<VecDeque<PortMessage>>,
 }
 
 impl Inbox {
-    pub(crate) fn new(messages: Receiver<Message>) -> Self {
+    pub(crate) fn new(messages: Receiver<PortMessage>) -> Self {
         Self { messages, deferred: RefCell::default() }
     }
 
     /// The next message; `None` if the arm is closed.
-    pub(crate) fn next(&self) -> Option<Message> {
+    pub(crate) fn next(&self) -> Option<PortMessage> {
         let deferred = self.deferred.borrow_mut().pop_front();
         deferred.or_else(|| self.messages.recv().ok())
     }
 
-    /// As [`Self::next`], but [`Message::Wake`] after this time.
-    pub(crate) fn next_within(&self, time: Option<Duration>) -> Option<Message> {
+    /// As [`Self::next`], but [`PortMessage::Wake`] after this time.
+    pub(crate) fn next_within(&self, time: Option<Duration>) -> Option<PortMessage> {
         let Some(time) = time else { return self.next() };
         if let Some(deferred) = self.deferred.borrow_mut().pop_front() {
             return Some(deferred);
         }
         match self.messages.recv_timeout(time) {
             Ok(message) => Some(message),
-            Err(RecvTimeoutError::Timeout) => Some(Message::Wake),
+            Err(RecvTimeoutError::Timeout) => Some(PortMessage::Wake),
             Err(RecvTimeoutError::Disconnected) => None,
         }
     }
 
-    /// Runs the reads that other threads wait for, and drops [`Message::Wake`]. Keeps everything else for later, in its order.
+    /// Runs the reads that other threads wait for, and drops [`PortMessage::Wake`]. Keeps everything else for later, in its order.
     fn serve_reads(&self, arm: &mut Arm) {
         while let Ok(message) = self.messages.try_recv() {
             match message {
-                Message::Read(call) => call(arm, self),
-                Message::Wake => {}
+                PortMessage::Read(call) => call(arm, self),
+                PortMessage::Wake => {}
                 other => self.deferred.borrow_mut().push_back(other),
             }
         }

@@ -1,9 +1,9 @@
 //! The thread that owns the port, and calls to it.
 //!
 //! ```text
-//!   Worker::call ── Message ──▶ serve ──▶ Arm, or an open SetPointStream
-//!        ▲                        │
-//!        └──────── result ────────┘
+//!   Worker::call ── PortMessage ──▶ serve ──▶ Arm, or an open SetPointStream
+//!        ▲                            │
+//!        └────────── result ──────────┘
 //! ```
 //!
 //! Calls run one after the other. Only a read may run while an earlier call waits for joints.
@@ -22,9 +22,9 @@ use sevenbot::{Arm, OpenError, Span};
 
 use crate::errors::{Closed, Raise};
 use crate::motion;
-use crate::place::{Place, no_thread};
+use crate::place::{ArmPlace, no_thread};
 use crate::progress::ProgressLine;
-use crate::watch::{CallState, Inbox, Message, PacedStream, StreamOrder, Watch};
+use crate::watch::{CallState, Inbox, PacedStream, PortMessage, StreamOrder, Watch};
 
 /// Time between two checks of Python's signals.
 pub(crate) const SIGNAL_PERIOD: Duration = Duration::from_millis(50);
@@ -32,14 +32,14 @@ pub(crate) const SIGNAL_PERIOD: Duration = Duration::from_millis(50);
 /// What opens an arm. The flag is set when the caller no longer waits.
 type Opener = Box<dyn FnOnce(Arc<AtomicBool>) -> Result<Arm, OpenError> + Send>;
 
-struct Port {
-    messages: Sender<Message>,
+struct PortThread {
+    messages: Sender<PortMessage>,
     thread: JoinHandle<()>,
 }
 
 /// The thread that owns an arm. It ends when this is closed or dropped.
 pub(crate) struct Worker {
-    open: Mutex<Option<Port>>,
+    open: Mutex<Option<PortThread>>,
     /// How often [`Self::interrupt`] was called.
     stops: Arc<AtomicU64>,
     /// The process of the thread. A forked process does not have the thread.
@@ -59,7 +59,7 @@ impl Worker {
         let stops = Arc::<AtomicU64>::default();
         let counted = Arc::clone(&stops);
         let is_cancelled = Arc::new(AtomicBool::new(false));
-        let (place, flag) = (Place::take(py)?, Arc::clone(&is_cancelled));
+        let (place, flag) = (ArmPlace::take(py)?, Arc::clone(&is_cancelled));
         let thread = thread::Builder::new().name("sevenbot".to_owned()).spawn(move || {
             let _place = place;
             match open(flag) {
@@ -71,11 +71,12 @@ impl Worker {
             }
         });
         let thread = thread.map_err(|why| no_thread(py, &why.to_string()))?;
-        let (opened, _) = wait(py, answer, &CallState::default(), Wait::AtMostUntilSignal(&is_cancelled))?;
-        Ok(opened.map(|told| (Self::of(Port { messages, thread }, stops), told)))
+        let (opened, _) =
+            wait(py, answer, &CallState::default(), SignalWait::AtMostUntilSignal(&is_cancelled))?;
+        Ok(opened.map(|told| (Self::of(PortThread { messages, thread }, stops), told)))
     }
 
-    fn of(port: Port, stops: Arc<AtomicU64>) -> Self {
+    fn of(port: PortThread, stops: Arc<AtomicU64>) -> Self {
         Self {
             open: Mutex::new(Some(port)),
             stops,
@@ -109,7 +110,7 @@ impl Worker {
                 drop(reply.send(work(arm)));
             }
         };
-        self.send(py, Message::Read(Box::new(call)))?;
+        self.send(py, PortMessage::Read(Box::new(call)))?;
         let (result, signal) = self.wait(py, answer, &state)?;
         signal.map_or(Ok(result), Err)
     }
@@ -137,11 +138,11 @@ impl Worker {
                 drop(reply.send(work(arm, &mut Watch { state: shared, inbox })));
             }
         };
-        self.send(py, Message::Call(Box::new(call)))?;
+        self.send(py, PortMessage::Call(Box::new(call)))?;
         self.wait(py, answer, &state)
     }
 
-    /// Interrupts all calls so far, whether they run or wait.
+    /// Interrupts all calls so far, whether they run or wait, except reads and the opening and closing of a stream.
     pub(crate) fn interrupt(&self) {
         self.stops.fetch_add(1, Ordering::Relaxed);
     }
@@ -150,20 +151,20 @@ impl Worker {
     pub(crate) fn sleep(&self, py: Python<'_>, time: Duration) -> PyResult<Result<(), MoveError>> {
         let (reply, answer) = sync_channel(1);
         let state = Arc::new(CallState::new(&self.stops));
-        self.send(py, Message::Sleep(time, Arc::clone(&state), reply))?;
+        self.send(py, PortMessage::Sleep(time, Arc::clone(&state), reply))?;
         let (slept, signal) = self.wait(py, answer, &state)?;
         signal.map_or(Ok(slept), Err)
     }
 
     /// Makes the thread of the port send the points that are due. Does not wait.
     pub(crate) fn wake(&self, py: Python<'_>) -> PyResult<()> {
-        self.send(py, Message::Wake)
+        self.send(py, PortMessage::Wake)
     }
 
     pub(crate) fn open_stream(&self, py: Python<'_>, order: StreamOrder) -> PyResult<()> {
         let (reply, answer) = sync_channel(1);
         let state = Arc::<CallState>::default();
-        self.send(py, Message::OpenStream(order, Arc::clone(&state), reply))?;
+        self.send(py, PortMessage::OpenStream(order, Arc::clone(&state), reply))?;
         let opened = self.wait(py, answer, &state).map_err(|error| {
             // The thread does not answer while another stream is open.
             let is_other_open = self.is_open() && error.is_instance_of::<Closed>(py);
@@ -178,7 +179,7 @@ impl Worker {
 
     /// Closes a stream that its caller has forgotten, without a wait.
     pub(crate) fn abandon_stream(&self) {
-        let close = Message::CloseStream(Arc::default(), sync_channel(1).0);
+        let close = PortMessage::CloseStream(Arc::default(), sync_channel(1).0);
         if let Some(port) = lock(&self.open).as_ref() {
             // The thread may have ended.
             let _ = port.messages.send(close);
@@ -199,7 +200,7 @@ impl Worker {
                 drop(reply.send(work(stream, &mut Watch { state: shared, inbox })));
             }
         };
-        self.send(py, Message::StreamCall(Box::new(call)))?;
+        self.send(py, PortMessage::StreamCall(Box::new(call)))?;
         let (result, signal) = self.wait(py, answer, &state)?;
         signal.map_or(Ok(result), Err)
     }
@@ -207,7 +208,7 @@ impl Worker {
     pub(crate) fn close_stream(&self, py: Python<'_>) -> PyResult<()> {
         let (reply, answer) = sync_channel(1);
         let state = Arc::<CallState>::default();
-        self.send(py, Message::CloseStream(Arc::clone(&state), reply))?;
+        self.send(py, PortMessage::CloseStream(Arc::clone(&state), reply))?;
         finish(py, self.wait(py, answer, &state)?)
     }
 
@@ -218,7 +219,7 @@ impl Worker {
         }
         self.interrupt();
         let open = lock(&self.open).take();
-        if let Some(Port { messages, thread }) = open {
+        if let Some(PortThread { messages, thread }) = open {
             drop(messages);
             // After a panic the thread has ended, too.
             py.detach(|| drop(thread.join()));
@@ -238,7 +239,7 @@ impl Worker {
         self.process != std::process::id()
     }
 
-    fn send(&self, py: Python<'_>, message: Message) -> PyResult<()> {
+    fn send(&self, py: Python<'_>, message: PortMessage) -> PyResult<()> {
         if self.is_forked() {
             return Err(Closed::raise_forked(py));
         }
@@ -257,7 +258,7 @@ impl Worker {
             py,
             answer,
             state,
-            Wait::ToTheEnd { shows_progress: self.shows_progress.load(Ordering::Relaxed) },
+            SignalWait::ToTheEnd { shows_progress: self.shows_progress.load(Ordering::Relaxed) },
         )
     }
 }
@@ -277,7 +278,7 @@ fn finish(py: Python<'_>, (result, signal): (Result<(), StreamError>, Option<PyE
 }
 
 /// What a signal of Python does to a wait.
-enum Wait<'a> {
+enum SignalWait<'a> {
     /// It interrupts the call, whose result follows soon. If the call has not begun yet, its caller leaves.
     ToTheEnd { shows_progress: bool },
     /// The caller leaves, and sets this flag.
@@ -289,7 +290,7 @@ fn wait<T: Send>(
     py: Python<'_>,
     mut answer: Receiver<T>,
     state: &CallState,
-    how: Wait<'_>,
+    how: SignalWait<'_>,
 ) -> PyResult<(T, Option<PyErr>)> {
     let mut line = ProgressLine::default();
     let mut signal = None;
@@ -304,13 +305,13 @@ fn wait<T: Send>(
             Err(RecvTimeoutError::Disconnected) => return Err(Closed::raise_no_stream(py)),
             Err(RecvTimeoutError::Timeout) => {}
         }
-        if matches!(how, Wait::ToTheEnd { shows_progress: true }) {
+        if matches!(how, SignalWait::ToTheEnd { shows_progress: true }) {
             let (done, total) = state.progress();
             line.show(done, total);
         }
         let Err(raised) = py.check_signals() else { continue };
         state.interrupt();
-        if let Wait::AtMostUntilSignal(is_left) = how {
+        if let SignalWait::AtMostUntilSignal(is_left) = how {
             is_left.store(true, Ordering::Relaxed);
             return Err(raised);
         }
@@ -324,12 +325,12 @@ fn wait<T: Send>(
 fn serve(mut arm: Arm, inbox: &Inbox, stops: &Arc<AtomicU64>) {
     while let Some(message) = inbox.next() {
         match message {
-            Message::Call(call) | Message::Read(call) => call(&mut arm, inbox),
-            Message::Sleep(_, state, _) | Message::OpenStream(_, state, _) if !state.claim() => {}
-            Message::Sleep(time, state, slept) => {
+            PortMessage::Call(call) | PortMessage::Read(call) => call(&mut arm, inbox),
+            PortMessage::Sleep(_, state, _) | PortMessage::OpenStream(_, state, _) if !state.claim() => {}
+            PortMessage::Sleep(time, state, slept) => {
                 let _ = slept.send(motion::sleep(&mut arm, time, &mut Watch { state, inbox }));
             }
-            Message::OpenStream(order, _, opened) => match PacedStream::open(&mut arm, order, stops) {
+            PortMessage::OpenStream(order, _, opened) => match PacedStream::open(&mut arm, order, stops) {
                 Ok(stream) => {
                     let _ = opened.send(Ok(()));
                     serve_stream(stream, inbox);
@@ -337,7 +338,7 @@ fn serve(mut arm: Arm, inbox: &Inbox, stops: &Arc<AtomicU64>) {
                 Err(error) => drop(opened.send(Err(error))),
             },
             // No stream is open. The caller sees the end of the channel.
-            Message::StreamCall(_) | Message::CloseStream(..) | Message::Wake => {}
+            PortMessage::StreamCall(_) | PortMessage::CloseStream(..) | PortMessage::Wake => {}
         }
     }
 }
@@ -346,18 +347,18 @@ fn serve(mut arm: Arm, inbox: &Inbox, stops: &Arc<AtomicU64>) {
 /// nothing, so that the arm's watchdog acts.
 fn serve_stream(mut stream: PacedStream<'_>, inbox: &Inbox) {
     while let Some(message) = inbox.next_within(stream.wakes_in()) {
-        if stream.simulation.is_none() || !matches!(message, Message::Wake) {
+        if stream.simulation.is_none() || !matches!(message, PortMessage::Wake) {
             stream.lead(inbox);
         }
         match message {
-            Message::Call(call) | Message::Read(call) => call(stream.stream.arm(), inbox),
-            Message::Sleep(_, state, _) if !state.claim() => {}
-            Message::Sleep(time, state, slept) => {
+            PortMessage::Call(call) | PortMessage::Read(call) => call(stream.stream.arm(), inbox),
+            PortMessage::Sleep(_, state, _) if !state.claim() => {}
+            PortMessage::Sleep(time, state, slept) => {
                 let _ = slept.send(stream.sleep(time, &mut Watch { state, inbox }));
             }
-            Message::StreamCall(call) => call(&mut stream, inbox),
-            Message::OpenStream(..) | Message::Wake => {}
-            Message::CloseStream(state, closed) => {
+            PortMessage::StreamCall(call) => call(&mut stream, inbox),
+            PortMessage::OpenStream(..) | PortMessage::Wake => {}
+            PortMessage::CloseStream(state, closed) => {
                 state.claim();
                 let _ = closed.send(stream.close());
                 return;

@@ -66,7 +66,7 @@ def test_an_arm_of_many_goes_as_the_simulation_alone_goes() -> None:
         assert arm.simulation.angles == tuple(arms.angles[1])
         assert arm.simulation.now == arms.time[1] == pytest.approx(1.4)
         assert arm.observe().positions == pytest.approx(seen[1, Arms.POSITIONS], abs=0.5)
-        # Both go on without another frame.
+        # Both go on without another action.
         before = arm.simulation.now
         arms.step(None, 0.02)
         arm.simulation.restore(arms.snapshot(1))

@@ -1,4 +1,4 @@
-"""The Python blocks of docs/python.md run in order. The blocks of docs/simulation.md pass a type checker, and its tests pass."""
+"""The blocks of docs/python.md run in order. They and those of docs/simulation.md pass type checkers, and their tests pass."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ NEAR = 3.0
 STILL = 1.5
 #: Seconds after the end of a method, in which the arm completes the move that the method began.
 AFTERWARDS = 3.0
-#: The number of frames that the arm receives before the call. A method detects a restart by the counter of frames.
+#: The number of reads before the call. A method detects a restart by the counter of frames.
 USED = 100
 
 #: The messages for a supply that is lost and comes back. Which one appears depends on when the method reads the arm.

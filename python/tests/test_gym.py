@@ -46,7 +46,7 @@ def episode(envs: Any, seed: int) -> list[Any]:
 def test_a_seed_determines_all_episodes_whatever_the_threads(task: str) -> None:
     runs = []
     for threads in (1, 3):
-        # Two episodes and a half: each reset of an arm is a step.
+        # Two episodes and a part of a third: each reset of an arm is a step.
         options = {"disturbed": True, "max_episode_steps": 25, "threads": threads}
         envs = gymnasium.make_vec(environment(task), 20, vectorization_mode="vector_entry_point", **options)
         runs.append(episode(envs, 4))

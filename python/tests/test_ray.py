@@ -1,6 +1,6 @@
 """The example with Ray: two workers do what one process does.
 
-`cargo xtask test --long` installs Ray where it has a wheel for the Python.
+`cargo xtask test --long` installs Ray and runs this file. The other steps leave it out.
 """
 
 from __future__ import annotations

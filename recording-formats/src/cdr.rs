@@ -33,7 +33,7 @@ pub(crate) fn decode<'a, M: Deserialize<'a>>(bytes: &'a [u8]) -> Option<M> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::messages::{Header, JointState, Time};
+    use crate::messages::{Header, JointStateMessage, Time};
 
     /// Two joints at 1.5 s. The lines: header, stamp, `frame_id`, names, number of positions, positions, velocities, efforts.
     const BYTES: &[&[u8]] = &[
@@ -48,8 +48,8 @@ mod tests {
         &[0, 0, 0, 0],
     ];
 
-    fn state() -> JointState {
-        JointState {
+    fn state() -> JointStateMessage {
+        JointStateMessage {
             header: Header { stamp: Time { sec: 1, nanosec: 500_000_000 }, frame_id: String::new() },
             name: vec!["a".to_owned(), "bc".to_owned()],
             position: vec![1.0, -2.0],
@@ -71,13 +71,13 @@ mod tests {
     fn cut_and_changed_messages_are_none_or_another_message() {
         let bytes = BYTES.concat();
         for end in 0..bytes.len() {
-            assert_eq!(decode::<JointState>(&bytes[..end]), None, "{end} bytes");
+            assert_eq!(decode::<JointStateMessage>(&bytes[..end]), None, "{end} bytes");
         }
         for place in 0..bytes.len() {
             for value in [0, 1, 0x7F, 0xFF] {
                 let mut changed = bytes.clone();
                 changed[place] = value;
-                let _ = decode::<JointState>(&changed);
+                let _ = decode::<JointStateMessage>(&changed);
             }
         }
     }

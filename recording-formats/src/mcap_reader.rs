@@ -14,7 +14,7 @@ use sevenbot::{FineAngle, Joint};
 
 use crate::cdr;
 use crate::joints::{names, to_degrees};
-use crate::messages::{JointState, RosMessage, Switch};
+use crate::messages::{BoolMessage, JointStateMessage, RosMessage};
 use crate::read_error::{McapReadError, ReadError};
 use crate::topics::first_time;
 
@@ -24,7 +24,7 @@ const LONGEST_RECORD: usize = 64 * 1_024 * 1_024;
 const STATES: [&str; 2] = ["joint_states", "robot_joint_states"];
 /// The last word of the topic with the state of the pump.
 const VACUUM: &str = "vacuum";
-/// The resolution of the times of a recording. A moment that follows the previous one by less than this is skipped.
+/// The resolution of the times of a recording. A moment is skipped if its rounded time is that of the previous one.
 const RESOLUTION: Duration = Duration::from_millis(1);
 
 /// Reads the recording, and passes each message on.
@@ -83,13 +83,13 @@ impl Tracks {
     fn add(&mut self, message: &Message) -> Result<(), McapReadError> {
         let is = |name: &str| message.channel.schema.as_ref().is_some_and(|schema| schema.name == name);
         let word = last_word(&message.channel.topic);
-        if word == VACUUM && is(Switch::NAME) {
-            self.vacuum = cdr::decode::<Switch>(&message.data).map_or(self.vacuum, |switch| switch.data);
+        if word == VACUUM && is(BoolMessage::NAME) {
+            self.vacuum = cdr::decode::<BoolMessage>(&message.data).map_or(self.vacuum, |switch| switch.data);
         }
-        if !(STATES.contains(&word) && is(JointState::NAME)) {
+        if !(STATES.contains(&word) && is(JointStateMessage::NAME)) {
             return Ok(());
         }
-        let Some(state) = cdr::decode::<JointState>(&message.data) else { return Ok(()) };
+        let Some(state) = cdr::decode::<JointStateMessage>(&message.data) else { return Ok(()) };
         let Some(positions) = positions(&state) else { return Ok(()) };
         // Some programs leave the stamp at 0. Then the time at which the message was logged counts.
         let stamp = state.header.stamp.since_epoch().filter(|stamp| !stamp.is_zero());
@@ -151,7 +151,7 @@ fn last_word(topic: &str) -> &str {
 }
 
 /// The positions of joints 1 to 7 in radians; `None` if the message lacks one.
-fn positions(state: &JointState) -> Option<[f64; 7]> {
+fn positions(state: &JointStateMessage) -> Option<[f64; 7]> {
     let mut positions = [0.0; 7];
     for (position, name) in positions.iter_mut().zip(names()) {
         let place = state.name.iter().position(|other| other == name)?;

@@ -65,7 +65,7 @@ pub(crate) struct Header {
 
 /// `sensor_msgs/msg/JointState`. A list is empty where nothing is known.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub(crate) struct JointState {
+pub(crate) struct JointStateMessage {
     pub(crate) header: Header,
     pub(crate) name: Vec<String>,
     /// In rad.
@@ -76,7 +76,7 @@ pub(crate) struct JointState {
     pub(crate) effort: Vec<f64>,
 }
 
-impl RosMessage for JointState {
+impl RosMessage for JointStateMessage {
     const NAME: &'static str = "sensor_msgs/msg/JointState";
     const DEFINITION: &'static str = concat!(
         "std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort\n",
@@ -120,22 +120,22 @@ impl RosMessage for Transforms {
 
 /// `std_msgs/msg/String`.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub(crate) struct Text {
+pub(crate) struct StringMessage {
     pub(crate) data: String,
 }
 
-impl RosMessage for Text {
+impl RosMessage for StringMessage {
     const NAME: &'static str = "std_msgs/msg/String";
     const DEFINITION: &'static str = "string data\n";
 }
 
 /// `std_msgs/msg/Bool`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub(crate) struct Switch {
+pub(crate) struct BoolMessage {
     pub(crate) data: bool,
 }
 
-impl RosMessage for Switch {
+impl RosMessage for BoolMessage {
     const NAME: &'static str = "std_msgs/msg/Bool";
     const DEFINITION: &'static str = "bool data\n";
 }

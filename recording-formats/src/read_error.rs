@@ -23,7 +23,7 @@ pub enum ReadError {
     /// The text or CSV is not a valid recording.
     #[error(transparent)]
     Text(#[from] RecordingError),
-    /// The MCAP file is not a valid recording of one arm.
+    /// The MCAP file is not a valid recording of one arm, or cannot be read: see [`McapReadError`].
     #[error(transparent)]
     Mcap(#[from] McapReadError),
     /// The MCAP file is cut off or damaged.

@@ -2,7 +2,7 @@
 
 use sevenbot::FineAngle;
 
-/// The values that an arm reports besides its pose. A value is `None` if it was not read, or if the firmware does not have it.
+/// The values that an arm reports besides its pose. A value is `None` if it is not recorded, or if the firmware does not have it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Telemetry {
     /// The target positions, joint 1 first.

@@ -6,8 +6,8 @@
 //!   the model, once ────▶ /robot_description, /tf_static ─────────────────────┘
 //! ```
 //!
-//! The writer never seeks, so the output may be a pipe. If the program is killed, the file has whole chunks, which readers
-//! recover.
+//! The writer never seeks, so the output may be a pipe. If the program is killed, the file has whole chunks, or whole messages with
+//! [`McapLayout::Live`]. Readers recover these.
 
 use std::collections::HashMap;
 use std::io::{self, Write};
@@ -23,7 +23,8 @@ use crate::cdr;
 use crate::diagnosis;
 use crate::joints::{all_names, names, to_radians, with_passive};
 use crate::messages::{
-    Diagnostics, Header, JointState, RosMessage, Switch, Text, Time, Transform, Transforms,
+    BoolMessage, Diagnostics, Header, JointStateMessage, RosMessage, StringMessage, Time, Transform,
+    Transforms,
 };
 use crate::telemetry::Telemetry;
 use crate::topics;
@@ -106,14 +107,14 @@ impl<W: Write> McapWriter<W> {
     /// [`Moment::time`]; of the latter it stores only the value of the first moment, as metadata.
     ///
     /// # Errors
-    /// The output cannot be written. The file then ends after the moments that [`McapWriter::written`] counts.
+    /// The output cannot be written. The file then holds at least the moments that [`McapWriter::written`] counts.
     pub fn add(&mut self, at: Duration, moment: &Moment, telemetry: &Telemetry) -> io::Result<()> {
         if self.vacuum.is_none() {
             self.first_time = moment.time;
             self.describe(at)?;
         }
         if self.vacuum.replace(moment.vacuum) != Some(moment.vacuum) {
-            self.publish(topics::VACUUM, at, &Switch { data: moment.vacuum })?;
+            self.publish(topics::VACUUM, at, &BoolMessage { data: moment.vacuum })?;
         }
         if let Some(targets) = telemetry.targets {
             self.publish(topics::COMMANDS, at, &command(at, targets))?;
@@ -151,7 +152,7 @@ impl<W: Write> McapWriter<W> {
 
     /// Publishes the constant messages: the model, and the transforms of the fixed links.
     fn describe(&mut self, at: Duration) -> io::Result<()> {
-        self.publish(topics::DESCRIPTION, at, &Text { data: arm_model::urdf()? })?;
+        self.publish(topics::DESCRIPTION, at, &StringMessage { data: arm_model::urdf()? })?;
         let straight = [FineAngle::from(sevenbot::Angle::from_register(0)); 7];
         self.publish(topics::FIXED_TRANSFORMS, at, &transforms(at, straight, true))
     }
@@ -210,7 +211,7 @@ fn header(at: Duration, frame: &str) -> Header {
     Header { stamp: Time::new(at), frame_id: frame.to_owned() }
 }
 
-fn joint_state(at: Duration, pose: [FineAngle; 7], telemetry: &Telemetry) -> JointState {
+fn joint_state(at: Duration, pose: [FineAngle; 7], telemetry: &Telemetry) -> JointStateMessage {
     let (mut velocity, mut effort) = (Vec::new(), Vec::new());
     if let Some(motion) = telemetry.motion {
         velocity = with_passive(motion.velocities.map(f64::to_radians));
@@ -218,7 +219,7 @@ fn joint_state(at: Duration, pose: [FineAngle; 7], telemetry: &Telemetry) -> Joi
         // The joints that follow have no motor.
         effort.resize(velocity.len(), 0.0);
     }
-    JointState {
+    JointStateMessage {
         header: header(at, ""),
         name: all_names().map(str::to_owned).collect(),
         position: with_passive(to_radians(pose)),
@@ -227,13 +228,13 @@ fn joint_state(at: Duration, pose: [FineAngle; 7], telemetry: &Telemetry) -> Joi
     }
 }
 
-fn command(at: Duration, targets: [FineAngle; 7]) -> JointState {
+fn command(at: Duration, targets: [FineAngle; 7]) -> JointStateMessage {
     let position = to_radians(targets).to_vec();
-    JointState {
+    JointStateMessage {
         header: header(at, ""),
         name: names().map(str::to_owned).collect(),
         position,
-        ..JointState::default()
+        ..JointStateMessage::default()
     }
 }
 

@@ -33,7 +33,7 @@ pub(crate) enum CommandError {
     Arm(String),
     /// Registers did not take their values.
     NotTaken(NotTaken),
-    /// The arm does not carry out the command, for these reasons.
+    /// The arm does not carry out the command, for these reasons, or `info` found them.
     Problems(Vec<Problem>),
     /// The arm may be moving, because this write failed.
     MayMove(WriteError),

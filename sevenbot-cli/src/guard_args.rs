@@ -1,7 +1,7 @@
 //! `--table` and `--no-guard`: the guard of the workspace at the command line.
 //!
-//! A move of the tip that the guard does not allow is an error with advice. A command that sets the targets of joints only
-//! warns.
+//! A move of the tip that the guard does not allow is an error with advice. `pose`, `home`, `play`, `stream` and the monitor's
+//! nudges only warn.
 
 use clap::Args;
 use sevenbot::cartesian::{Guard, StraightLineError, StraightLineFault, TipRefusal, Vector};

@@ -59,7 +59,7 @@ impl Interrupt {
 }
 
 /// Runs `work`, which may move the arm. After an interrupt, makes the arm hold its position, and fails with
-/// [`CommandError::Interrupted`]. After another failure, warns if the arm may be moving.
+/// [`CommandError::Interrupted`], or with the failure of the hold. After another failure, warns if the arm may be moving.
 pub(crate) fn hold_on_interrupt<T>(
     arm: &mut Arm,
     work: impl FnOnce(&mut Arm, Interrupt) -> Result<T, CommandError>,

@@ -1,7 +1,7 @@
 //! A file for a result: opened before the work, written at its end, or part by part after [`OutputFile::begin`].
 //!
-//! So a path that cannot be written is refused before anything moves, and an existing file keeps its content until the
-//! result is there.
+//! So a path that cannot be written is refused before anything moves, and an existing file keeps its content until the result is
+//! there, or until [`OutputFile::begin`].
 
 use std::fs::{self, File};
 use std::io::{self, IsTerminal, Stdout, Write};

@@ -72,7 +72,7 @@ impl SettingsFile {
         ))
     }
 
-    /// Reads a file of this format, up to [`LONGEST`] bytes.
+    /// Reads a file of this format, shorter than [`LONGEST`] bytes.
     pub(crate) fn read(path: &Path) -> Result<Self, CommandError> {
         let text = input_file::short_text(path, LONGEST)?;
         let file: Self = toml::from_str(&text).map_err(|error| {

@@ -13,7 +13,7 @@ use crate::progress::Progress;
 
 const ROUNDING: &str = "this arm takes whole degrees: each joint goes to the nearest one";
 
-/// Shows a bar for each stage of a call, and ends the call after Ctrl-C.
+/// Shows a bar for each stage of a call, one for stages with the same unit, and ends the call after Ctrl-C.
 pub(crate) struct ProgressWatch {
     bar: Option<(&'static str, Progress)>,
 }
@@ -44,7 +44,7 @@ impl Observer for ProgressWatch {
     }
 }
 
-/// Tells the user if a move goes to whole degrees only.
+/// Tells the user if the targets of a move were rounded to whole degrees.
 pub(crate) fn note_rounding(begun: &JointMove) {
     if begun.is_rounded() {
         note(ROUNDING);
@@ -70,7 +70,6 @@ pub(crate) fn note_other_pace(arm: &mut Arm, targets: &FineTargets) -> Result<()
              degrees/s"
         ));
     }
-    Ok(())
 }
 
 /// As [`note_rounding`], before a recording is played.

@@ -2,17 +2,17 @@
 //!
 //! If a client does not take its bytes, its reports are dropped first. Then its replies are queued, its reads wait for room,
 //! and finally its bytes stay in the connection. Its writes are carried out unless they are behind a read that waits
-//! ([D5](protocol_core::decisions#d5)).
+//! ([D5](protocol_core::decisions#d5)); a stop passes that read.
 
 use protocol_core::report_kind::ReportKind;
-use protocol_core::request::{Reply, Report};
+use protocol_core::request::{Reply, ReportMap21};
 use protocol_core::time::Instant;
 use protocol_core::wire::deframer::gap;
 use protocol_core::wire::{Deframer, FrameBuffer, Function, MAX_LENGTH, ToArm};
 
-use crate::hub::{ClientId, Event, Hub, WholeRequest};
+use crate::hub::{ClientId, Hub, HubEvent, WholeRequest};
 
-/// Reports are dropped while this many bytes or more wait for the client. At 50 Hz they are 1.4 s of reports of 14 bytes,
+/// Reports are dropped while this many bytes or more wait for the client. At 50 Hz they are 1.5 s of reports of 14 bytes,
 /// or 0.4 s of the longest ones, 49 bytes.
 const MOST_REPORT_BYTES: usize = 1_024;
 /// Reads of the client wait when its output could exceed this many bytes with the next reply.
@@ -88,11 +88,11 @@ impl FrameClient {
         let mut frame = FrameBuffer::new();
         while let Some(event) = hub.take_event(self.id) {
             match &event {
-                Event::Reply { address, values } => Reply { address: *address, values }.encode(&mut frame),
-                Event::Report { stream, values } if self.output.len() < MOST_REPORT_BYTES => {
+                HubEvent::Reply { address, values } => Reply { address: *address, values }.encode(&mut frame),
+                HubEvent::Report { stream, values } if self.output.len() < MOST_REPORT_BYTES => {
                     encode_report(*stream, values, &mut frame);
                 }
-                Event::Report { .. } | Event::NoReply { .. } => continue,
+                HubEvent::Report { .. } | HubEvent::NoReply { .. } => continue,
             }
             self.output.extend_from_slice(&frame);
         }
@@ -124,6 +124,6 @@ fn encode_report(stream: ReportKind, values: &[u8], frame: &mut FrameBuffer) {
         ReportKind::Positions | ReportKind::FinePositions | ReportKind::FineState => {
             Reply { address, values }.encode(frame)
         }
-        ReportKind::Angles | ReportKind::Loads => Report { address, values }.encode(frame),
+        ReportKind::Angles | ReportKind::Loads => ReportMap21 { address, values }.encode(frame),
     }
 }

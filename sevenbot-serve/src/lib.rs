@@ -59,5 +59,5 @@ pub mod server;
 mod token;
 
 pub use frame_client::FrameClient;
-pub use hub::{ClientId, Event, Hub, WholeRequest};
+pub use hub::{ClientId, Hub, HubEvent, WholeRequest};
 pub use maker::MakerClient;

@@ -1,5 +1,5 @@
-//! A flood of one client delays the others by less than 10 ms, in virtual time. Also tests frames for which the hub has no
-//! room.
+//! A flood of one client delays the others by less than 10 ms, in virtual time. Also tests frames and
+//! messages for which there is no room.
 //!
 //! The clients with frames stand for programs at pseudo-terminals and over TCP: the server uses the same client for both.
 

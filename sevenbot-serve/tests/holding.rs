@@ -357,7 +357,7 @@ fn the_makers_stop_does_not_wait_for_the_commands_before_it() {
     }
 }
 
-/// The reads get no replies, so no command of the queue is carried out meanwhile.
+/// The reads get no replies, so of the queue only the stop is carried out meanwhile.
 #[test]
 fn the_makers_stop_is_carried_out_however_many_commands_wait() {
     for waiting in [19, 20, 21, 400] {

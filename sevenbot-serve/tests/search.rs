@@ -15,7 +15,7 @@ use arm_sim::plant::Plant;
 use arm_sim::simulated_arm::{ArmConfig, SimulatedArm};
 use motion_core::servo_bus::TorqueCodes;
 use protocol_core::time::Instant;
-use sevenbot_serve::server::{ArmLocation, Notice, Server, ServerConfig, Stop};
+use sevenbot_serve::server::{ArmLocation, Notice, Server, ServerConfig, ServerStop};
 use tty_ports::pty::Pty;
 use tty_ports::symlink::Symlink;
 
@@ -86,7 +86,7 @@ fn an_arm_that_comes_back_under_another_name_is_found_among_others() {
     let (arm, other_arm) = (Some([1; 6]), Some([2; 6]));
     let plugged = Plugged::plug(&port("ttyUSB0"), arm);
     let _silent = Plugged::plug(&port("ttyUSB1"), None);
-    let stop = Stop::default();
+    let stop = ServerStop::default();
     let trigger = stop.clone();
     let (sender, notices) = mpsc::channel();
     let server = thread::spawn(move || {

@@ -325,7 +325,7 @@ fn a_damaged_reply_is_asked_for_again() {
 }
 
 /// While a read has no reply, an equal read asks for a few registers more, so that the replies differ. A read of 255 registers
-/// cannot be made longer. So the reply to the next read may count as the reply that was lost.
+/// cannot be made longer. So the next one is sent after the end of the one before.
 #[test]
 fn a_damaged_reply_with_all_registers_costs_no_program_its_own() {
     let mut world = World::new(3);

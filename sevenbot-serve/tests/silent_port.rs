@@ -15,7 +15,7 @@ use arm_sim::plant::Plant;
 use arm_sim::simulated_arm::{ArmConfig, SimulatedArm};
 use motion_core::servo_bus::TorqueCodes;
 use protocol_core::time::Instant;
-use sevenbot_serve::server::{ArmLocation, ClassConfig, Notice, Server, ServerConfig, Stop};
+use sevenbot_serve::server::{ArmLocation, ClassConfig, Notice, Server, ServerConfig, ServerStop};
 use tty_ports::pty::Pty;
 
 static START: LazyLock<std::time::Instant> = LazyLock::new(std::time::Instant::now);
@@ -68,7 +68,7 @@ fn the_server_of_a_class_notices_that_the_arm_does_not_answer_although_nobody_re
     let arm = Some(ArmLocation::Port(port.clone()));
     let server = Server::open(ServerConfig { class: Some(class), ..ServerConfig::new(arm, 115_200) })
         .expect("it opens");
-    let stop = Stop::default();
+    let stop = ServerStop::default();
     let trigger = stop.clone();
     let (sender, notices) = mpsc::channel();
     let running = thread::spawn(move || server.run(&stop, &mut |notice| drop(sender.send(notice))));

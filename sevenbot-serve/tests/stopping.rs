@@ -37,8 +37,8 @@ fn positions(world: &mut World) -> [i32; 7] {
     look(world).1
 }
 
-/// A program stops the arm as `sevenbot stop` does: it reads the positions, and writes them as targets. Returns the time
-/// until the write reached the arm, and the targets.
+/// A program stops the arm: it reads the positions, and writes them as targets. Returns the time until the write reached the
+/// arm, and the targets.
 fn stop(world: &mut World, program: usize) -> (Duration, Vec<u8>) {
     world.round_trip(program, &read(FINE_TARGET.address, 28));
     let (_, values) = world.take(program).pop().expect("a reply");
@@ -95,7 +95,7 @@ impl Attack {
     }
 }
 
-/// Stops the arm at random moments while program 0 streams. The arm does not move after it took the stop.
+/// Stops the arm at random moments while program 0 streams. After a stop the arm brakes, and comes to rest where it was stopped.
 fn stop_often(attack: Attack) {
     let times: u64 = std::env::var("SERVE_STOPS").map_or(8, |text| text.parse().expect("a number"));
     let mut world = World::new(2 + ATTACKERS);

@@ -10,7 +10,9 @@ use std::sync::{Arc, mpsc};
 use std::thread;
 use std::time::Duration;
 
-use sevenbot_serve::server::{AccessPolicy, Notice, RefusalReason, Server, ServerConfig, Stop, TlsFiles};
+use sevenbot_serve::server::{
+    AccessPolicy, Notice, RefusalReason, Server, ServerConfig, ServerStop, TlsFiles,
+};
 use tokio_rustls::rustls::pki_types::CertificateDer;
 use tokio_rustls::rustls::pki_types::pem::PemObject;
 use tokio_rustls::rustls::{ClientConfig, ClientConnection, RootCertStore, StreamOwned};
@@ -49,7 +51,7 @@ fn only_encrypted_clients_with_the_token_are_served() {
     };
     let server = Server::open(config).expect("a server");
     let address = server.tcp_address().expect("an address");
-    let stop = Stop::default();
+    let stop = ServerStop::default();
     let trigger = stop.clone();
     let (sender, notices) = mpsc::channel();
     let running = thread::spawn(move || server.run(&stop, &mut |notice| drop(sender.send(notice))));

@@ -120,7 +120,8 @@ impl Arm {
     }
 
     /// Does the arm have this register? Registers that only map 2.1 has are missing in the maker's firmware 2.2.
-    /// [`OPTIONS`](crate::map21::OPTIONS) and registers 128 to 199 are in this project's firmware only.
+    /// [`OPTIONS`](crate::map21::OPTIONS) and registers 128 to 199 are in this project's firmware only. `true` for all other
+    /// addresses, also for unused ones and those of a status block that the firmware lacks.
     #[must_use]
     pub fn serves(&self, address: u8) -> bool {
         self.view.serves(address)
@@ -196,7 +197,7 @@ impl Arm {
     ///
     /// Registers that need both maps, or that map 2.1 has elsewhere, are written in several frames. A write to a register that
     /// only map 2.1 has ends the reports of map 2.2 ([M4](protocol_core::decisions#m4)). [`Arm::write_checked`] starts them
-    /// again.
+    /// again. In map 2.1 the present positions are left out, and with other firmware than ours the registers of inverse kinematics.
     ///
     /// # Errors
     /// The registers reach past 255 or one frame does not hold all (then nothing is sent), or the port failed.
@@ -240,7 +241,7 @@ impl Arm {
         self.link.sleep(duration);
     }
 
-    /// Takes the reports received so far, oldest first.
+    /// Takes the reports that earlier calls received, oldest first. Does not read the line.
     pub fn reports(&mut self) -> impl Iterator<Item = Report> {
         self.reports.drain()
     }
@@ -286,7 +287,7 @@ impl Arm {
         self.flush()
     }
 
-    /// Gives up the last background question, because its answer would be out of date.
+    /// Gives up the last background question, and drops its answer.
     pub(crate) fn forget_background_question(&mut self) {
         if let Some(read) = self.background.take() {
             self.link.cancel(read.id);

@@ -130,11 +130,11 @@ impl From<PortError> for OpenError {
 pub struct ReceiveCounts {
     /// All bytes, with echoes.
     pub bytes: usize,
-    /// Echoes of sent frames. Only an adapter of the servo bus returns them.
+    /// Echoes of sent frames. Counted on a servo bus only.
     pub echoes: usize,
-    /// Good frames that are neither the answer nor an echo.
+    /// Good frames that are neither the answer nor a counted echo.
     pub other_frames: usize,
-    /// Frames with a wrong checksum.
+    /// Frames with a wrong checksum, or with a range past register 255.
     pub damaged_frames: usize,
     /// Good frames that the same line delivered before this exchange.
     pub earlier_frames: usize,

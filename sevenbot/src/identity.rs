@@ -5,7 +5,7 @@ use protocol_core::registers::map21::Map;
 
 use host_link::Snapshot;
 
-/// The highest firmware version, in tenths, with map 2.1. The maker's 2.2 has map 2.2.
+/// The highest version of the maker's firmware, in tenths, with map 2.1. The maker's 2.2 has map 2.2.
 const LAST_VERSION_WITH_MAP_21: u8 = 21;
 
 /// Registers 0 to 7 of an arm.
@@ -33,7 +33,7 @@ pub struct Identity(Snapshot);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Firmware {
-    /// This project's, 3.0 or later: all functions work.
+    /// This project's, 3.0 or later: with map 2.2 all functions work.
     Ours,
     /// The maker's, 1.0 to 2.4. It has no status block and checks no ranges. It reports no refusal, except by alarms in map 2.1.
     Makers,

@@ -7,7 +7,8 @@
 //!    └── reports ◀── sent by the arm (D14) ─┘
 //! ```
 //!
-//! Calls of [`Arm`] block, with timeouts. Frames and the register table come from `protocol-core`, which the arm uses too.
+//! Calls of [`Arm`] block, with timeouts. Frames and the register table come from `protocol-core`, which this project's firmware
+//! uses too.
 //! `D1` to `D30` are rules in `docs/protocol.md`. The library sends targets; the arm plans the motion.
 //!
 //! ```no_run

@@ -6,7 +6,7 @@
 //! ```
 //!
 //! In map 2.1 the present positions and their report frequency have other addresses, and the offsets another encoding.
-//! Everything else that map 2.2 names is the same. The registers that only map 2.1 has keep their addresses. This
+//! Everything else that map 2.2 names has the same address. The registers that only map 2.1 has keep their addresses. This
 //! project's firmware serves both maps, so the function code of map 2.1 writes a register that only map 2.1 has.
 
 use std::ops::RangeInclusive;
@@ -54,7 +54,7 @@ pub(crate) struct WriteFrame {
 }
 
 impl MapView {
-    /// Does the arm have this register? Only a register of map 2.1 or of this project can be missing.
+    /// Does the arm have this register? Only a register that map 2.1 alone has, or one of 128 to 199, counts as missing.
     pub(crate) fn serves(self, address: u8) -> bool {
         let has_map21 = self.firmware == Firmware::Ours || self.map == Map::V21;
         // Register 20 (M6), the extended block (D21) and the protection block (D27) are this project's additions.

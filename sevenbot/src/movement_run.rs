@@ -20,7 +20,7 @@ use crate::playback::Step;
 use crate::point_path::PointPath;
 use crate::stream::{PaceCounts, StreamPace};
 
-/// The measurements go on for this time after the end of a path, because servos lag.
+/// The measurements go on for this time after the end of a path or of steps, because servos lag.
 const TAIL: Duration = Duration::from_millis(300);
 /// After a longer pause of the program, the movement goes on where it paused: the arm has stopped there, and would leap if
 /// the next point were a later one.
@@ -97,7 +97,7 @@ pub struct MovementRun {
     vacuum: Option<bool>,
     /// The point to send next, after the pump was switched.
     point: Option<FineTargets>,
-    /// After the last point: when the run is over.
+    /// After the last point or step: when the run is over.
     end: Option<Duration>,
 }
 

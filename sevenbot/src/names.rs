@@ -16,8 +16,8 @@ use host_link::Span;
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum NameError {
-    /// The text is not a number, and no register name starts with it. Rows of map 2.1 do not count if map 2.2 uses
-    /// all their addresses.
+    /// The text is empty, or it is not a number and no register name starts with it. Rows of map 2.1 do not count if map 2.2
+    /// uses all their addresses.
     #[error("there is no register of this name: `sevenbot registers` lists the names")]
     Unknown,
     /// Several register names start with the text.

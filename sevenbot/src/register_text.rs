@@ -17,7 +17,7 @@ use crate::names::name_of_register;
 use crate::units::Speed;
 use host_link::{Snapshot, Span};
 
-/// The text of one value: one register, or several that form one number.
+/// The text of one value: of one register, or of several that belong together.
 ///
 /// ```
 /// use sevenbot::Snapshot;
@@ -34,7 +34,7 @@ pub struct RegisterEntry {
     pub name: String,
     /// The raw bytes, in the order of the registers.
     pub bytes: Vec<u8>,
-    /// The number in the table's unit, as `sevenbot set` takes it.
+    /// The number or numbers in the table's unit, as `sevenbot set` takes them; of raw bytes and a chip id, hexadecimal.
     pub value: String,
     /// The meaning of the number; may be empty.
     pub meaning: String,

@@ -107,7 +107,7 @@ impl StreamOptions {
     }
 }
 
-/// Why a stream does not start.
+/// Why a stream does not start, or why its registers are not put back.
 ///
 /// ```
 /// use sevenbot::stream::StreamError;
@@ -163,7 +163,7 @@ impl From<WriteError> for StreamError {
 pub struct SetPointStream<'a> {
     arm: &'a mut Arm,
     options: StreamOptions,
-    /// The values that the stream's registers had before; `None` once they are put back, or left to the watchdog.
+    /// The values to put back at the end; `None` once they are put back, or left to the watchdog.
     before: Option<Vec<u8>>,
     last_sent: Duration,
     /// Watches over the joints that got a point.
@@ -207,7 +207,7 @@ impl<'a> SetPointStream<'a> {
     ///
     /// # Errors
     /// A joint of the stream is blocked, let go or silent, a servo has a new alarm, the supply was lost, the controller restarted,
-    /// the motors are off, another program stopped the arm, or the arm does not answer any more.
+    /// the motors are off, another program stopped the arm, the arm does not answer any more, or the port failed.
     pub fn check(&mut self) -> Result<(), MoveCheckError> {
         self.check.poll(self.arm)
     }
@@ -316,8 +316,8 @@ impl Arm {
     }
 
     /// Sends nothing for the time of the arm's watchdog, so that it acts unless another program sends (D24). Then
-    /// [`Arm::end_abandoned_stream`] finds the stream of a program that was killed a moment ago. Does not wait if the watchdog
-    /// is off or has acted.
+    /// [`Arm::end_abandoned_stream`] finds the stream of a program that was killed a moment ago. Does not wait if the arm has no
+    /// watchdog, or if it is off or has acted.
     ///
     /// # Errors
     /// As [`Arm::read`].

@@ -11,7 +11,7 @@ use serialport::{ClearBuffer, SerialPort};
 use crate::frames::{read_request, with_checksum, write_request};
 use crate::wait::{TIMEOUT, wait_for};
 
-/// A reply or a report, which has the same form.
+/// A reply, or a report of map 2.2, which has the same form.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ReplyFrame {
     /// The address of the first register.
@@ -26,7 +26,7 @@ pub struct ArmClient {
 }
 
 impl ArmClient {
-    /// Opens a port, and waits while another program has it open.
+    /// Opens a port, and waits while it cannot be opened, for example because another program has it open.
     #[must_use]
     pub fn open(path: &Path, baud: u32) -> Self {
         let name = path.to_str().expect("port names are UTF-8");

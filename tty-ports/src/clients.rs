@@ -1,4 +1,5 @@
-//! Uses inotify to count the clients of each port. A client is a program that has the terminal of the port open.
+//! Uses inotify to count the clients of each port. A client is a program that has the terminal of the port open; a program
+//! that opens it twice counts as two.
 //!
 //! The program itself keeps its ports open, so the kernel does not report that the last client has closed a port. inotify
 //! reports each open and each close. But it merges consecutive equal reports that have not been read yet: two opens in a row
@@ -55,7 +56,7 @@ struct WatchedPort {
 pub struct PortNews {
     /// A client opened the port, or was found after reports were lost.
     pub was_opened: bool,
-    /// The last client closed it.
+    /// The last client closed it, or none was found after reports were lost.
     pub was_emptied: bool,
 }
 

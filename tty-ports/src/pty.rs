@@ -36,7 +36,7 @@ pub struct Pty {
 }
 
 impl Pty {
-    /// Opens a pseudo-terminal in raw mode that only this user can open. Its clients are counted if the system reports
+    /// Opens a pseudo-terminal in raw mode that only this user can open. `clients` counts its clients, if the system reports
     /// them.
     ///
     /// # Errors

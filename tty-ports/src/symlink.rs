@@ -1,9 +1,9 @@
 //! A stable name for the port: a symbolic link that exists while the program runs.
 //!
 //! A program that was killed leaves its link. The next program may replace this link, but never the link of a running
-//! program, nor a link that the user made. The kernel reuses the numbers of pseudo-terminals. So a link whose target exists
-//! may still be a link of a killed program. Two facts distinguish the link of a running program. The program holds a lock,
-//! which the kernel frees when the process ends. And its pseudo-terminal is older than its link.
+//! program, nor a link to anything but a pseudo-terminal. The kernel reuses the numbers of pseudo-terminals. So a link whose
+//! target exists may still be a link of a killed program. Two facts distinguish the link of a running program. The program
+//! holds a lock, which the kernel frees when the process ends. And its pseudo-terminal is older than its link.
 
 use std::fs::{self, Metadata};
 use std::hash::{DefaultHasher, Hash, Hasher};

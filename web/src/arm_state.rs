@@ -2,7 +2,7 @@
 
 use kinematics::geometry::{LINKAGE_MAX, LINKAGE_MIN};
 use kinematics::{forward, limits};
-use sevenbot::cartesian::{Breach, Guard, JointPath, Obstacle};
+use sevenbot::cartesian::{Breach, FixedObstacle, Guard, JointPath};
 use sevenbot::map::{
     FAULTS, FINE_POSITION, FINE_TARGET, LOAD, MISSING_SERVOS, MOTOR_STATE, MOVING_JOINTS, PRESENT_POSITION,
     SERVO_TEMPERATURE, SPEED, SUPPLY_VOLTAGE, TARGET_POSITION, TIME, VELOCITY, motor_state,
@@ -176,8 +176,8 @@ fn first_five(angles: [f32; 7]) -> [f64; 5] {
 #[must_use]
 pub const fn breach_text(breach: &Breach) -> &'static str {
     match breach.obstacle {
-        Obstacle::Table => "below-table",
-        Obstacle::Base => "in-base",
+        FixedObstacle::Table => "below-table",
+        FixedObstacle::Base => "in-base",
     }
 }
 

@@ -7,7 +7,7 @@
 //! ```
 
 use classroom::message::POINTS;
-use classroom::{Doing, FromPupil, Goals, Report, StopOutcome, ToPupil};
+use classroom::{Doing, ExerciseProgress, FromPupil, StopOutcome, TabReport, ToPupil};
 use kinematics::forward;
 use sevenbot::map::motor_state;
 
@@ -119,13 +119,18 @@ pub enum Activity {
 
 /// The answer to [`ToPupil::Ask`]. `is_hidden`: the tab is in the background.
 #[must_use]
-pub fn report(client: &Client, activity: Activity, goals: Option<Goals>, is_hidden: bool) -> String {
+pub fn report(
+    client: &Client,
+    activity: Activity,
+    goals: Option<ExerciseProgress>,
+    is_hidden: bool,
+) -> String {
     let state = client.state();
     let is_known = client.is_connected() && state.measured.iter().all(Option::is_some);
     let doing =
         if client.is_connected() { doing(&state, client.stop_progress(), activity) } else { Doing::NoArm };
     let points = is_known.then(|| points(state.angles()));
-    FromPupil::Report(Report { points, doing, goals, is_hidden }).to_json()
+    FromPupil::Report(TabReport { points, doing, goals, is_hidden }).to_json()
 }
 
 /// What the arm does, in one word. If several facts apply, the most important one wins.
@@ -166,7 +171,7 @@ mod tests {
     const STOP: &str = r#"{"stop":{"number":3}}"#;
     const STOPPED: &str = r#"{"stopped":{"number":3,"outcome":"holds"}}"#;
 
-    fn reported(tab: &Tab, activity: Activity) -> Report {
+    fn reported(tab: &Tab, activity: Activity) -> TabReport {
         match serde_json::from_str(&report(&tab.client, activity, None, false)) {
             Ok(FromPupil::Report(report)) => report,
             other => panic!("{other:?}"),

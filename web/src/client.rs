@@ -18,7 +18,7 @@ use sevenbot::traffic::Traffic;
 use sevenbot::{Snapshot, Span};
 
 use crate::arm_state::ArmState;
-use crate::stop::{Stop, StopProgress, hold_frames};
+use crate::stop::{ArmStop, StopProgress, hold_frames};
 
 /// A read is given up 400 ms after its reply was due. A reply takes about a tenth of this time at 115,200 baud and through a
 /// server.
@@ -57,7 +57,7 @@ pub struct Client {
     is_round_lost: bool,
     rounds: u64,
     lost_rounds: u32,
-    stop: Stop,
+    stop: ArmStop,
     frames: VecDeque<ShownFrame>,
 }
 
@@ -74,14 +74,14 @@ impl Default for Client {
             is_round_lost: false,
             rounds: 0,
             lost_rounds: 0,
-            stop: Stop::default(),
+            stop: ArmStop::default(),
             frames: VecDeque::new(),
         }
     }
 }
 
 impl Client {
-    /// True after the first complete round, until a reply was lost in each of three consecutive rounds.
+    /// True after a complete round, until a reply was lost in each of three consecutive rounds.
     #[must_use]
     pub const fn is_connected(&self) -> bool {
         self.rounds > 0 && self.lost_rounds < LOST_ROUNDS

@@ -9,7 +9,7 @@ const ATTEMPTS: u32 = 5;
 
 /// The registers did not have the written values after the last attempt.
 #[derive(Debug)]
-pub(crate) struct NotTaken;
+pub(crate) struct Unconfirmed;
 
 /// Writes that are repeated until a later read shows their values.
 #[derive(Debug)]
@@ -28,7 +28,7 @@ impl Confirmed {
 
     /// Returns `Ok(true)` when a later read has shown the written values, and `Ok(false)` before. If a read shows other values,
     /// writes again, at most [`ATTEMPTS`] times in all.
-    pub(crate) fn poll(&mut self, now: Instant, client: &mut Client) -> Result<bool, NotTaken> {
+    pub(crate) fn poll(&mut self, now: Instant, client: &mut Client) -> Result<bool, Unconfirmed> {
         if !client.was_read_since(self.written) {
             return Ok(false);
         }
@@ -40,7 +40,7 @@ impl Confirmed {
             return Ok(true);
         }
         if self.attempts >= ATTEMPTS {
-            return Err(NotTaken);
+            return Err(Unconfirmed);
         }
         let attempts = self.attempts + 1;
         *self = Self { attempts, ..Self::write(std::mem::take(&mut self.frames), now, client) };

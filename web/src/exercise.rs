@@ -3,7 +3,7 @@
 use arm_sim::Action;
 use arm_sim::scene::Scene;
 use arm_sim::world::{Object, World};
-use exercises::{Observation, SeenThing};
+use exercises::{SeenThing, Situation};
 use protocol_core::time::Instant;
 use sevenbot::Snapshot;
 use sevenbot::map::BLOCKED_JOINTS;
@@ -12,11 +12,11 @@ use crate::arm_state::ArmState;
 use crate::source::simulator::SimulatedSource;
 use crate::stop::since_start;
 
-/// Makes an observation from the registers at `now` and, for a simulated arm, from the things in its room.
+/// The situation, from the registers at `now` and, for a simulated arm, from the things in its room.
 #[must_use]
-pub fn observation(now: Instant, registers: &Snapshot, world: Option<&World>) -> Observation {
+pub fn situation(now: Instant, registers: &Snapshot, world: Option<&World>) -> Situation {
     let state = ArmState::new(registers);
-    Observation {
+    Situation {
         seconds: since_start(now).as_secs_f64(),
         tip: state.tip(),
         joints: state.answered().map(|angle| angle.map(f64::from)),
@@ -54,7 +54,7 @@ mod tests {
                 SolutionPart::Repair => tab.act("clear"),
                 SolutionPart::Program(program) => {
                     let watch = |_, tab: &mut Tab| {
-                        attempt.observe(&tab.observation());
+                        attempt.observe(&tab.situation());
                     };
                     ends.push(tab.run(program, watch).0);
                     // Enough time to confirm the hold after a failed program.
@@ -85,20 +85,20 @@ mod tests {
         for action in ["fault 1=wall=115", "scene cube red 30 40 0 200"] {
             tab.act(action);
         }
-        assert_eq!(tab.observation().things.len(), 1);
+        assert_eq!(tab.situation().things.len(), 1);
         super::set_up(&mut tab.arm, Vec::new());
         let (address, values) =
             crate::arm_state::target_frame(tab.client.registers(), 1, 150.0).expect("a target");
         tab.client.write(tab.now(), address, &values);
         tab.pass(120);
-        assert!(tab.observation().things.is_empty());
+        assert!(tab.situation().things.is_empty());
         assert!((tab.angles()[0] - 150.0).abs() < 1.0, "no wall: {:?}", tab.angles());
     }
 
     #[test]
     fn a_silent_joint_is_nowhere() {
         let mut tab = Tab::new();
-        let seen = |tab: &Tab| tab.observation();
+        let seen = |tab: &Tab| tab.situation();
         assert!(seen(&tab).tip.is_some() && seen(&tab).joints[2].is_some());
         tab.act("fault 3=missing");
         tab.pass(60);
@@ -112,7 +112,7 @@ mod tests {
             let (mut tab, mut attempt) = (Tab::new(), Attempt::new(&exercise));
             for _ in 0..200 {
                 tab.pass(1);
-                attempt.observe(&tab.observation());
+                attempt.observe(&tab.situation());
             }
             assert!(attempt.reached().all(|is_reached| !is_reached), "{}", exercise.title.of("en"));
         }

@@ -1,13 +1,13 @@
 //! Plays recordings: the page's shell around [`MovementRun`] and [`MoveWatch`].
 //!
 //! ```text
-//!   Player: open the stream ──▶ way to the first pose ──▶ the movement ──▶ close the stream ──▶ PlayProgress
-//!            └── both are written again until a read has confirmed them ───────────┘
+//!   PagePlayer: open the stream ──▶ way to the first pose ──▶ the movement ──▶ close the stream ──▶ PlayProgress
+//!                └── both are written up to five times, until a read confirms them ────┘
 //! ```
 
 use std::time::Duration;
 
-use host_link::sharing::{Command, SharingState};
+use host_link::sharing::{SharingCommand, SharingState};
 use protocol_core::time::Instant;
 use sevenbot::approach::{Approach, ApproachRule, Standing, StartTooFar};
 use sevenbot::health::{MoveFault, MoveWatch};
@@ -20,7 +20,7 @@ use sevenbot::stream::{StreamOptions, WatchdogAction};
 use sevenbot::{Health, Joint, Snapshot};
 
 use crate::client::{BAUD, Client};
-use crate::confirmed::{Confirmed, NotTaken, write_all};
+use crate::confirmed::{Confirmed, Unconfirmed, write_all};
 use crate::stop::since_start;
 
 /// Time between two points of a played movement, in milliseconds. A browser calls the page every 17 ms, so a point is sent up to
@@ -42,7 +42,7 @@ pub enum PlayRefusal {
     TooFar(StartTooFar),
 }
 
-/// What [`Player::poll`] returns: whether the movement goes on or has ended.
+/// What [`PagePlayer::poll`] returns: whether the movement goes on or has ended.
 #[derive(Clone, Debug, PartialEq)]
 pub enum PlayProgress {
     /// The movement is not over yet.
@@ -68,8 +68,8 @@ pub enum PlayFailure {
     StoppedByAnother,
 }
 
-impl From<NotTaken> for PlayFailure {
-    fn from(_: NotTaken) -> Self {
+impl From<Unconfirmed> for PlayFailure {
+    fn from(_: Unconfirmed) -> Self {
         Self::NotTaken
     }
 }
@@ -78,14 +78,14 @@ impl From<NotTaken> for PlayFailure {
 /// Writes nothing without a server.
 pub(crate) fn start_anew(now: Instant, client: &mut Client) {
     if SharingState::of(client.registers()).is_some() {
-        let (address, values) = Command::StartAnew.write();
+        let (address, values) = SharingCommand::StartAnew.write();
         client.write(now, address, &values);
     }
 }
 
 /// The stages of a player, in their order.
 #[derive(Debug)]
-enum Stage {
+enum PlayerStage {
     Start,
     Opening(Confirmed),
     Way(MovementRun),
@@ -96,7 +96,7 @@ enum Stage {
 
 /// Plays a recording on the arm, after the way to its first pose. [`Self::poll`] drives it.
 #[derive(Debug)]
-pub struct Player {
+pub struct PagePlayer {
     recording: Recording,
     /// The path to the first moment.
     approach: Approach,
@@ -111,10 +111,10 @@ pub struct Player {
     /// A fault that a stop by another client may have caused: the registers of the arm may show the effect of the stop one round
     /// before the server reports the stop.
     suspected: Option<MoveFault>,
-    stage: Stage,
+    stage: PlayerStage,
 }
 
-impl Player {
+impl PagePlayer {
     /// Parses a recording, to be played from now on by the arm with these registers. With `approach`, the arm goes to the first
     /// pose in this time, or longer if a joint would exceed its speed.
     ///
@@ -158,7 +158,7 @@ impl Player {
             watch: if is_fine { watch.with_period(PERIOD_MS) } else { watch },
             watched_round: 0,
             suspected: None,
-            stage: Stage::Start,
+            stage: PlayerStage::Start,
         })
     }
 
@@ -172,13 +172,13 @@ impl Player {
     #[must_use]
     pub fn progress(&self) -> f64 {
         match &self.stage {
-            Stage::Path(run) => {
+            PlayerStage::Path(run) => {
                 let part = |count| f64::from(u32::try_from(count).unwrap_or(u32::MAX));
                 let (done, all) = run.progress();
                 part(done) / part(all).max(1.0)
             }
-            Stage::Start | Stage::Opening(_) | Stage::Way(_) => 0.0,
-            Stage::Closing(_) | Stage::Settling(_) => 1.0,
+            PlayerStage::Start | PlayerStage::Opening(_) | PlayerStage::Way(_) => 0.0,
+            PlayerStage::Closing(_) | PlayerStage::Settling(_) => 1.0,
         }
     }
 
@@ -207,43 +207,43 @@ impl Player {
 
     /// Ends the stream after a stop. The stop itself restores the speeds.
     pub fn end_stream(&self, now: Instant, client: &mut Client) {
-        if self.is_fine && !matches!(self.stage, Stage::Start | Stage::Settling(_)) {
+        if self.is_fine && !matches!(self.stage, PlayerStage::Start | PlayerStage::Settling(_)) {
             client.write(now, SET_POINT_PERIOD.address, &[0; 4]);
         }
     }
 
     /// Ends the movement early: closes the stream, and restores speeds and times. The arm stops at the last point that was sent.
     pub fn end(&self, now: Instant, client: &mut Client) {
-        if !matches!(self.stage, Stage::Start | Stage::Settling(_)) {
+        if !matches!(self.stage, PlayerStage::Start | PlayerStage::Settling(_)) {
             write_all(&self.closing_frames(), now, client);
         }
     }
 
     fn advance(&mut self, now: Instant, client: &mut Client) -> Result<PlayProgress, PlayFailure> {
         match &mut self.stage {
-            Stage::Start => {
+            PlayerStage::Start => {
                 if self.starts_anew {
                     start_anew(now, client);
                 }
-                self.stage = Stage::Opening(Confirmed::write(self.opening_frames(), now, client));
+                self.stage = PlayerStage::Opening(Confirmed::write(self.opening_frames(), now, client));
             }
-            Stage::Opening(opening) => {
+            PlayerStage::Opening(opening) => {
                 if opening.poll(now, client)? {
-                    self.stage = Stage::Way(self.way(now));
+                    self.stage = PlayerStage::Way(self.way(now));
                 }
             }
-            Stage::Way(_) | Stage::Path(_) => {
+            PlayerStage::Way(_) | PlayerStage::Path(_) => {
                 self.watch(now, client)?;
                 if self.suspected.is_none() {
                     self.drive(now, client)?;
                 }
             }
-            Stage::Closing(closing) => {
+            PlayerStage::Closing(closing) => {
                 if closing.poll(now, client)? {
-                    self.stage = Stage::Settling(now);
+                    self.stage = PlayerStage::Settling(now);
                 }
             }
-            Stage::Settling(since) => {
+            PlayerStage::Settling(since) => {
                 let away = Health::new(client.registers()).away_from_targets(ALL_JOINTS);
                 if away.is_empty() {
                     return Ok(PlayProgress::Played);
@@ -277,7 +277,7 @@ impl Player {
     }
 
     fn drive(&mut self, now: Instant, client: &mut Client) -> Result<(), PlayFailure> {
-        let (Stage::Way(run) | Stage::Path(run)) = &mut self.stage else { return Ok(()) };
+        let (PlayerStage::Way(run) | PlayerStage::Path(run)) = &mut self.stage else { return Ok(()) };
         loop {
             match run.poll(since_start(now)) {
                 RunStep::Wait(_) => return Ok(()),
@@ -289,8 +289,8 @@ impl Player {
             }
         }
         self.stage = match &self.stage {
-            Stage::Way(_) => Stage::Path(self.path(now, client)),
-            _ => Stage::Closing(Confirmed::write(self.closing_frames(), now, client)),
+            PlayerStage::Way(_) => PlayerStage::Path(self.path(now, client)),
+            _ => PlayerStage::Closing(Confirmed::write(self.closing_frames(), now, client)),
         };
         Ok(())
     }

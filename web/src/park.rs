@@ -68,7 +68,7 @@ impl From<MoveFault> for ParkFailure {
 }
 
 #[derive(Debug)]
-enum Stage {
+enum ParkStage {
     Start,
     /// Waits until this round of reads is complete.
     Beginning(u64),
@@ -84,7 +84,7 @@ enum Stage {
 pub struct Park {
     /// The registers before the park, with the speeds to restore.
     before: Snapshot,
-    stage: Stage,
+    stage: ParkStage,
     interruptions: Interruptions,
     watch: MoveWatch,
     /// The round of the last registers that were checked.
@@ -97,7 +97,7 @@ impl Park {
     pub fn new(before: Snapshot, now: Instant) -> Self {
         Self {
             before,
-            stage: Stage::Start,
+            stage: ParkStage::Start,
             interruptions: Interruptions::default(),
             watch: MoveWatch::new(since_start(now), ALL_JOINTS, BAUD),
             watched_round: 0,
@@ -118,7 +118,7 @@ impl Park {
 
     /// Ends the park early, because something else is about to move the arm. Moving joints hold.
     pub fn end(&self, now: Instant, client: &mut Client) {
-        if matches!(self.stage, Stage::Way(..)) {
+        if matches!(self.stage, ParkStage::Way(..)) {
             client.hold(now, self.speeds());
         }
     }
@@ -130,11 +130,11 @@ impl Park {
             Err(failure) => {
                 match (&self.stage, &failure) {
                     // The arm holds already, and the server drops targets of this client, so a stop could not be confirmed.
-                    (Stage::Way(..), ParkFailure::Move(PlayFailure::StoppedByAnother)) => {
+                    (ParkStage::Way(..), ParkFailure::Move(PlayFailure::StoppedByAnother)) => {
                         client.write(now, SPEED.address, &self.speeds());
                     }
-                    (Stage::Way(..), _) => client.stop(now, Some(self.speeds())),
-                    (Stage::LetGo(..), failure) if holds_again(failure) => {
+                    (ParkStage::Way(..), _) => client.stop(now, Some(self.speeds())),
+                    (ParkStage::LetGo(..), failure) if holds_again(failure) => {
                         client.write(now, MOTOR_STATE.address, &[motor_state::SERVO]);
                     }
                     _ => {}
@@ -145,17 +145,17 @@ impl Park {
     }
 
     fn advance(&mut self, now: Instant, client: &mut Client) -> Result<ParkProgress, ParkFailure> {
-        if matches!(self.stage, Stage::Start) {
+        if matches!(self.stage, ParkStage::Start) {
             start_anew(now, client);
-            self.stage = Stage::Beginning(client.rounds() + ROUNDS_TO_KNOW);
+            self.stage = ParkStage::Beginning(client.rounds() + ROUNDS_TO_KNOW);
         }
         self.check(now, client)?;
         let state = client.state();
         match &mut self.stage {
-            Stage::Beginning(round) if client.rounds() >= *round => {
-                self.stage = Stage::Way(way(&state)?, None)
+            ParkStage::Beginning(round) if client.rounds() >= *round => {
+                self.stage = ParkStage::Way(way(&state)?, None)
             }
-            Stage::Way(way, sent) => match (*sent, way.last()) {
+            ParkStage::Way(way, sent) => match (*sent, way.last()) {
                 (None, Some(targets)) => {
                     client.write(now, SPEED.address, &[SPEED_STEPS; 7]);
                     for (address, values) in frames(client, targets) {
@@ -177,10 +177,10 @@ impl Park {
                     client.write(now, SPEED.address, &self.before.joints(&SPEED));
                     client.write(now, MOTOR_STATE.address, &[motor_state::DAMPING]);
                     self.watch = MoveWatch::new(since_start(now), ALL_JOINTS, BAUD).of_positions();
-                    self.stage = Stage::LetGo(state.angles(), now, client.rounds() + ROUNDS_TO_KNOW);
+                    self.stage = ParkStage::LetGo(state.angles(), now, client.rounds() + ROUNDS_TO_KNOW);
                 }
             },
-            Stage::LetGo(start, since, round) => {
+            ParkStage::LetGo(start, since, round) => {
                 let is_known = client.rounds() >= *round;
                 return watch_parked(now, &state, start, *since, is_known);
             }
@@ -194,7 +194,7 @@ impl Park {
         self.interruptions.check_pause(now)?;
         // Fails if the arm is silent. The client reads all registers in any case, so the span to read is not needed.
         self.watch.question(since_start(now))?;
-        let is_known = !matches!(self.stage, Stage::Beginning(round) if client.rounds() < round);
+        let is_known = !matches!(self.stage, ParkStage::Beginning(round) if client.rounds() < round);
         if is_known && client.rounds() != self.watched_round {
             self.watched_round = client.rounds();
             self.interruptions.check_stops(client.registers())?;

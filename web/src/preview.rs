@@ -8,7 +8,7 @@ use sevenbot::map::{SPEED, TIME};
 
 use crate::arm_state::{ArmState, target_frame};
 use crate::client::Client;
-use crate::program::{Pace, ProgramFailure, ProgramProgress, ProgramRun};
+use crate::program::{ProgramFailure, ProgramProgress, ProgramRun, RunMode};
 use crate::source::Source;
 use crate::source::simulator::SimulatedSource;
 use crate::stop::since_start;
@@ -88,7 +88,7 @@ impl Preview {
 
     fn begin(client: Client, arm: SimulatedSource, program: &Program) -> Self {
         let begun = arm.now();
-        let run = ProgramRun::new(program, Pace::Running, client.registers(), begun);
+        let run = ProgramRun::new(program, RunMode::Running, client.registers(), begun);
         Self { client, arm, run, begun, steps: 0, time_line: TimeLine::default() }
     }
 

@@ -4,26 +4,26 @@
 //!   Interpreter ── Begin ──▶ the lit block; in single steps the program waits here
 //!        │  ▲ ──── Sensor ─▶ registers of the last round ──┐
 //!        │  └──────────────────────────────────────────────┘
-//!        └── Command ──▶ Confirmed: registers that the arm has to take
-//!                    ──▶ JointMove: targets, until the joints are there as measured
-//!                    ──▶ Player: a straight line
+//!        └── ProgramCommand ──▶ Confirmed: registers that the arm has to take
+//!                    ──▶ ProgramMove: targets, until the joints are there as measured
+//!                    ──▶ PagePlayer: a straight line
 //! ```
 //!
 //! The program continues after a block only when the arm has carried out the block. A blocked or silent joint, a stop, or another
-//! client that moves the arm ends the program.
+//! client that changes the targets of the current move ends the program.
 
 mod command;
 mod failure;
 mod joint_move;
 mod sensor;
 
-use block_programs::{BlockId, Event, Interpreter, Program};
+use block_programs::{BlockId, Interpreter, Program, ProgramEvent};
 use protocol_core::time::Instant;
 use sevenbot::Snapshot;
 use sevenbot::health::MoveWatch;
 use sevenbot::map::{SPEED, TIME};
 
-use command::Action;
+use command::RunStage;
 pub use failure::ProgramFailure;
 
 use crate::client::{BAUD, Client};
@@ -38,7 +38,7 @@ const BLOCKS_PER_POLL: u32 = 200;
 /// What [`ProgramRun::poll`] returns: whether the program runs, waits or has ended.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ProgramProgress {
-    /// The program is not over yet.
+    /// Blocks run, or the arm carries one out.
     Running,
     /// The program waits before the lit block until a person asks for the next step.
     Waiting,
@@ -50,7 +50,7 @@ pub enum ProgramProgress {
 
 /// How the program goes from one block to the next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Pace {
+pub enum RunMode {
     /// It runs without a pause.
     Running,
     /// It waits for [`ProgramRun::go_on`] before each block.
@@ -61,12 +61,12 @@ pub enum Pace {
 #[derive(Debug)]
 pub struct ProgramRun {
     interpreter: Interpreter,
-    pace: Pace,
+    mode: RunMode,
     /// True while the program waits before a block for [`Self::go_on`].
     is_waiting: bool,
     /// The current block; `None` before the first one.
     block: Option<BlockId>,
-    action: Action,
+    stage: RunStage,
     /// The registers before the program, with the speeds and times to restore.
     before: Snapshot,
     watch: MoveWatch,
@@ -78,13 +78,13 @@ pub struct ProgramRun {
 impl ProgramRun {
     /// Begins a program on an arm with these registers. Their speeds and times are restored at the end.
     #[must_use]
-    pub fn new(program: &Program, pace: Pace, registers: &Snapshot, now: Instant) -> Self {
+    pub fn new(program: &Program, mode: RunMode, registers: &Snapshot, now: Instant) -> Self {
         Self {
             interpreter: Interpreter::new(program),
-            pace,
+            mode,
             is_waiting: false,
             block: None,
-            action: Action::Start,
+            stage: RunStage::Start,
             before: registers.clone(),
             watch: MoveWatch::new(since_start(now), 0, BAUD),
             watched_round: 0,
@@ -110,9 +110,9 @@ impl ProgramRun {
         &self.before
     }
 
-    /// Continues at this pace. If the program waits, runs the next block.
-    pub const fn go_on(&mut self, pace: Pace) {
-        self.pace = pace;
+    /// Continues in this mode. If the program waits, runs the next block.
+    pub const fn go_on(&mut self, mode: RunMode) {
+        self.mode = mode;
         self.is_waiting = false;
     }
 
@@ -135,10 +135,10 @@ impl ProgramRun {
     /// Ends the program, because something else is about to move the arm, and restores speeds and times. Moving joints hold:
     /// otherwise the restored speeds would act on their moves at once (D11).
     pub fn end(self, now: Instant, client: &mut Client) {
-        if self.action.may_move() {
+        if self.stage.may_move() {
             client.hold(now, self.before.joints(&SPEED));
         }
-        if let Action::Line(player) = &self.action {
+        if let RunStage::Line(player) = &self.stage {
             player.end_stream(now, client);
         }
         write_all(&self.closing_frames(), now, client);
@@ -147,7 +147,7 @@ impl ProgramRun {
     fn fail(&self, failure: &ProgramFailure, now: Instant, client: &mut Client) {
         // The arm holds already, and the server drops targets of this client, so a stop could not be confirmed.
         let is_stopped = *failure == ProgramFailure::Arm(PlayFailure::StoppedByAnother);
-        if self.action.may_move() && !is_stopped {
+        if self.stage.may_move() && !is_stopped {
             self.hold(now, client);
         } else {
             write_all(&self.closing_frames(), now, client);
@@ -156,7 +156,7 @@ impl ProgramRun {
 
     fn hold(&self, now: Instant, client: &mut Client) {
         client.stop(now, Some(self.before.joints(&SPEED)));
-        if let Action::Line(player) = &self.action {
+        if let RunStage::Line(player) = &self.stage {
             player.end_stream(now, client);
         }
         client.write(now, TIME.address, &self.before.joints(&TIME));
@@ -168,13 +168,15 @@ impl ProgramRun {
 
     fn advance(&mut self, now: Instant, client: &mut Client) -> Result<ProgramProgress, ProgramFailure> {
         self.interruptions.check_pause(now).map_err(ProgramFailure::Arm)?;
-        match self.action {
-            Action::Start => {
+        match self.stage {
+            RunStage::Start => {
                 start_anew(now, client);
-                self.action = Action::Beginning(client.rounds() + ROUNDS_TO_KNOW);
+                self.stage = RunStage::Beginning(client.rounds() + ROUNDS_TO_KNOW);
                 return Ok(ProgramProgress::Running);
             }
-            Action::Beginning(round) if client.rounds() < round => return Ok(ProgramProgress::Running),
+            RunStage::Beginning(round) if client.rounds() < round => {
+                return Ok(ProgramProgress::Running);
+            }
             _ => self.watch(now, client)?,
         }
         self.run_blocks(now, client)
@@ -196,13 +198,13 @@ impl ProgramRun {
             if self.is_waiting {
                 return Ok(ProgramProgress::Waiting);
             }
-            if !self.action.is_done(now, client)? {
+            if !self.stage.is_done(now, client)? {
                 return Ok(ProgramProgress::Running);
             }
-            if matches!(self.action, Action::Closing(_)) {
+            if matches!(self.stage, RunStage::Closing(_)) {
                 return Ok(ProgramProgress::Over);
             }
-            self.action = Action::Ready;
+            self.stage = RunStage::Ready;
             self.run_block(now, client)?;
         }
         Ok(ProgramProgress::Running)
@@ -212,20 +214,20 @@ impl ProgramRun {
     fn run_block(&mut self, now: Instant, client: &mut Client) -> Result<(), ProgramFailure> {
         loop {
             match self.interpreter.advance()? {
-                Event::Begin(block) => {
+                ProgramEvent::Begin(block) => {
                     self.block = Some(block);
-                    self.is_waiting = self.pace == Pace::SingleSteps;
+                    self.is_waiting = self.mode == RunMode::SingleSteps;
                     return Ok(());
                 }
-                Event::Sensor(wanted) => {
+                ProgramEvent::Sensor(wanted) => {
                     self.interpreter.answer(sensor::read(wanted, now, client.registers())?);
                 }
-                Event::Command(command) => {
-                    self.action = command::begin(&command, now, client)?;
+                ProgramEvent::Command(command) => {
+                    self.stage = command::begin(&command, now, client)?;
                     return Ok(());
                 }
-                Event::Over => {
-                    self.action = Action::Closing(Confirmed::write(self.closing_frames(), now, client));
+                ProgramEvent::Over => {
+                    self.stage = RunStage::Closing(Confirmed::write(self.closing_frames(), now, client));
                     return Ok(());
                 }
             }

@@ -11,14 +11,14 @@ use crate::stop::since_start;
 
 /// Collects the measured poses of the arm as the text of a recording.
 #[derive(Debug)]
-pub struct Recorder {
+pub struct PageRecorder {
     start: Instant,
     lines: RecordingLines,
     text: String,
     watch: MoveWatch,
 }
 
-impl Recorder {
+impl PageRecorder {
     /// Begins a recording. `now` is its time 0.
     #[must_use]
     pub fn new(now: Instant) -> Self {

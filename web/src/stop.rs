@@ -8,7 +8,7 @@ use sevenbot::hold::{HeldJoints, Hold, HoldStep};
 use sevenbot::map::SPEED;
 
 /// Writes of registers: first address, values.
-type Frames = Vec<(u8, Vec<u8>)>;
+type RegisterWrites = Vec<(u8, Vec<u8>)>;
 
 /// What became of the last stop of the page.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -28,12 +28,12 @@ pub enum StopProgress {
 
 /// The last stop, and its progress.
 #[derive(Debug, Default)]
-pub struct Stop {
+pub struct ArmStop {
     progress: StopProgress,
     hold: Hold,
 }
 
-impl Stop {
+impl ArmStop {
     /// Begins a stop. `registers` are the last known ones; `None` if they were not read yet. `speeds` are the speeds to restore,
     /// if those in the registers are temporary. Does nothing while another stop is not confirmed yet.
     pub fn start(&mut self, registers: Option<&Snapshot>, speeds: Option<[u8; 7]>) {
@@ -66,7 +66,7 @@ impl Stop {
     }
 
     /// The frames to write now, before all other queued frames. Also updates the progress.
-    pub fn frames(&mut self, now: Instant) -> Frames {
+    pub fn frames(&mut self, now: Instant) -> RegisterWrites {
         if self.progress != StopProgress::Verifying {
             return Vec::new();
         }
@@ -83,11 +83,11 @@ impl Stop {
 
 /// The frames that make the joints hold without a confirmation, and then set these speeds. If the motors are off or damped, the
 /// frames only set the speeds.
-pub(crate) fn hold_frames(registers: &Snapshot, speeds: [u8; 7]) -> Frames {
+pub(crate) fn hold_frames(registers: &Snapshot, speeds: [u8; 7]) -> RegisterWrites {
     let frames = match Hold::at_once(Some(&HeldJoints::of(registers))).poll(Duration::ZERO) {
         HoldStep::Write(frames) => frames,
         // The motors are off or damped: no joint has to hold.
-        _ => Frames::new(),
+        _ => RegisterWrites::new(),
     };
     frames.into_iter().chain([(SPEED.address, speeds.to_vec())]).collect()
 }

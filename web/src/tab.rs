@@ -1,15 +1,15 @@
 //! A page and its simulated arm for tests, in virtual time.
 
 use block_programs::Program;
-use exercises::Observation;
+use exercises::Situation;
 use protocol_core::time::Instant;
 use sevenbot::Joint;
 use sevenbot::map::{SPEED, TIME};
 
 use crate::client::Client;
-use crate::exercise::observation;
+use crate::exercise::situation;
 use crate::preview::exchange;
-use crate::program::{Pace, ProgramProgress, ProgramRun};
+use crate::program::{ProgramProgress, ProgramRun, RunMode};
 use crate::source::simulator::SimulatedSource;
 
 /// The virtual time between two pictures of the page, in microseconds: 1/60 s.
@@ -39,17 +39,17 @@ impl Tab {
         self.arm.now()
     }
 
-    pub(crate) fn observation(&self) -> Observation {
-        observation(self.now(), self.client.registers(), self.arm.simulation().plant().world())
+    pub(crate) fn situation(&self) -> Situation {
+        situation(self.now(), self.client.registers(), self.arm.simulation().plant().world())
     }
 
     pub(crate) fn act(&mut self, action: &str) {
         self.arm.act(action.parse().expect("an action"));
     }
 
-    pub(crate) fn begin(&self, workspace: &str, pace: Pace) -> ProgramRun {
+    pub(crate) fn begin(&self, workspace: &str, mode: RunMode) -> ProgramRun {
         let program = Program::parse(workspace).unwrap_or_else(|error| panic!("{error:?}"));
-        ProgramRun::new(&program, pace, self.client.registers(), self.now())
+        ProgramRun::new(&program, mode, self.client.registers(), self.now())
     }
 
     /// Runs a program to its end. Calls `during` before each picture with its number, for example to inject a fault.
@@ -58,7 +58,7 @@ impl Tab {
         workspace: &str,
         mut during: impl FnMut(u32, &mut Self),
     ) -> (ProgramProgress, ProgramRun) {
-        let mut run = self.begin(workspace, Pace::Running);
+        let mut run = self.begin(workspace, RunMode::Running);
         for picture in 0..20_000 {
             during(picture, self);
             match run.poll(self.now(), &mut self.client) {

@@ -8,7 +8,7 @@ use sevenbot::recording::{Moment, Recording};
 /// The arm at one moment.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stand {
-    /// The time since the movement began.
+    /// The time since the program began, or the time in the recording.
     pub time: Duration,
     /// Angles of joints 1 to 7, in degrees.
     pub angles: [f32; 7],

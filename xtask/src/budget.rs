@@ -68,8 +68,8 @@ impl Budget {
     }
 }
 
-/// Prints the figures and compares them with `xtask/budgets/<file>.txt`. With `accept`, writes them into this file instead, and
-/// keeps the limits.
+/// Prints the figures and compares them with `xtask/budgets/<file>.txt`. With `accept`, writes the figures that do not vary into
+/// this file instead, and keeps the limits.
 pub(crate) fn check(file: &str, figures: &[Figure], accept: bool) -> TaskResult {
     let path = root().join("xtask/budgets").join(file).with_extension("txt");
     let text = fs::read_to_string(&path).unwrap_or_default();

@@ -6,8 +6,8 @@
 //!                                               └─> target/fuzz/failures inputs that break a rule
 //! ```
 //!
-//! The next run continues with the inputs of the last one, except in the fixed form. `verification/fuzz/README.md` describes the
-//! targets.
+//! The next run continues with the inputs of the last one. The fixed form starts with the corpus alone, and has a folder of its
+//! own for new inputs. `verification/fuzz/README.md` describes the targets.
 
 use std::fs;
 use std::io;

@@ -1,4 +1,4 @@
-//! `cargo xtask docs`: the arm's model in the ROS packages, from the crate `arm-model`: URDF, and a mesh of each link as STL.
+//! `cargo xtask docs`: the arm's model in the ROS packages, from the crate `arm-model`: URDF, and the meshes of links as STL.
 
 use arm_model::{Body, Mesh};
 

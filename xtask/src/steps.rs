@@ -112,7 +112,7 @@ pub(crate) fn run(
                     .iter()
                     .map(|lane| scope.spawn(|| run.lane(lane, true).map_err(|why| why.to_string())))
                     .collect();
-                // Wait for all lanes. The first failure is reported.
+                // Wait for all lanes. If several lanes fail, the first of them in the list is reported.
                 let outcomes: Vec<_> = running.into_iter().map(thread::ScopedJoinHandle::join).collect();
                 outcomes
                     .into_iter()

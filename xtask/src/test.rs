@@ -1,6 +1,7 @@
 //! `cargo xtask test`: all checks and tests in one run.
 //!
-//! No step of the chosen scope is skipped: the first step installs the tools, and a step without its tool fails.
+//! No step of the chosen scope is skipped: the first step installs the tools that each run needs, and a step without its tool
+//! fails.
 
 use clap::Args;
 

@@ -10,7 +10,7 @@ use rustix::process::{Pid, WaitId, WaitIdOptions, WaitOptions, waitid};
 
 use crate::run::TaskResult;
 
-/// The length of a tick in /proc: 1/100 s on every Linux (USER_HZ).
+/// The length of a tick in /proc: 1/100 s (USER_HZ).
 const TICK: Duration = Duration::from_millis(10);
 
 /// How long the processes of a step may outlive the step.
@@ -57,7 +57,7 @@ pub(crate) fn adopt_orphans() -> TaskResult {
     Ok(rustix::process::set_child_subreaper(Some(rustix::process::getpid()))?)
 }
 
-/// Does nothing: other systems have no such mechanism.
+/// Does nothing on other systems.
 #[cfg(not(target_os = "linux"))]
 pub(crate) fn adopt_orphans() -> TaskResult {
     Ok(())

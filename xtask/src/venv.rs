@@ -93,7 +93,7 @@ fn works(python: &Path) -> bool {
     pip.status().is_ok_and(|status| status.success())
 }
 
-/// `pip install`.
+/// The command that installs packages, which the caller adds.
 pub(crate) fn pip(python: &Path) -> Command {
     let mut command = Command::new(python);
     command.args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check"]);

@@ -1,6 +1,6 @@
 //! The faults in words, for the help of programs. Lines have at most 80 columns, so that a terminal does not wrap them.
 
-/// A line or more for each fault: how it is written, and what it does.
+/// The faults: how each is written, and what it does.
 pub const FAULTS_HELP: &str = "\
 \x20 3=missing                the servo of joint 3 has no power
   3=late, 3=late=MS        its answers are 30 ms late, or MS

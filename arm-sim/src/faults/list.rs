@@ -10,7 +10,7 @@ use super::{ArmFault, FaultLocation, FaultReport, Obstacle};
 /// The most reports of ended faults that are kept.
 const REPORTS: usize = 16;
 
-/// A fault, and when it ends by itself.
+/// A fault, and when its duration is over.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct ListedFault {
@@ -60,7 +60,7 @@ impl FaultList {
         taken
     }
 
-    /// When the next fault ends by itself. `None`: no fault does.
+    /// When the next duration is over. `None`: no fault has one.
     pub(crate) fn deadline(&self) -> Option<Instant> {
         self.0.iter().filter_map(|listed| listed.until).min()
     }

@@ -44,7 +44,7 @@ impl Plant {
     }
 
     /// Scales the stall torque of all servos, and the friction and drag of their gears, in percent of the values in
-    /// [`parameters`](crate::parameters). So simulated arms can differ from each other.
+    /// [`parameters`](crate::parameters). Friction by load stays. So simulated arms can differ from each other.
     pub fn scale_servos(&mut self, torque_percent: u16, friction_percent: u16) {
         for (servo, joint) in self.servos_mut().iter_mut().zip(Joint::ALL) {
             servo.set_parameters(&ServoParameters::of(joint).scaled(torque_percent, friction_percent));

@@ -42,7 +42,8 @@ impl Plant {
         servo.measure(scale.position(angle.into()), moved, load);
     }
 
-    /// The angle that a servo's control aims at, in thousandths of a degree. It moves to the goal at the speed of the goal.
+    /// The angle that a servo's control aims at, in thousandths of a degree. It moves to the goal at the speed or in the time of
+    /// the goal. Without torque it is the joint's angle.
     #[must_use]
     pub fn set_point(&self, joint: Joint) -> i32 {
         let set_point = self.servo(joint).map_or(0, |servo| AngleScale::of(joint).angle(servo.set_point()));

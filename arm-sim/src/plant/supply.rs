@@ -22,7 +22,7 @@ const DIP: Duration = Duration::from_millis(20);
 pub enum SupplyFault {
     /// The voltage without load, in 0.1 V.
     Volts(u8),
-    /// Once in each period of this length the voltage falls to 3 V for 20 ms, and all servos restart.
+    /// After each period of this length the voltage falls to 3 V for 20 ms, and all servos restart.
     Dips(Duration),
     /// No voltage: no servo answers.
     Off,

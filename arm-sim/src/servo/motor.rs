@@ -19,7 +19,7 @@ use motion_core::servo_bus::Reading;
 use protocol_core::registers::Joint;
 
 use super::gear::{Gear, Torques};
-use super::registers::Goal;
+use super::registers::ServoGoal;
 use super::surroundings::Surroundings;
 use super::units::{COUNT, COUNT_PER_SECOND};
 use crate::parameters::{DERIVATIVE_FILTER_MS, FULL_DUTY_ERROR, NO_LOAD_SPEED, ServoParameters};
@@ -124,7 +124,7 @@ impl Motor {
     }
 
     /// Starts a move from the set-point.
-    pub(crate) fn start(&mut self, goal: Goal) {
+    pub(crate) fn start(&mut self, goal: ServoGoal) {
         self.target = i64::from(goal.position_counts) * COUNT;
         let distance = (self.target - self.set_point).abs();
         let rate = match (i64::from(goal.speed), i64::from(goal.time_ms)) {
@@ -137,7 +137,7 @@ impl Motor {
     }
 
     /// Does the last move go to the position of this goal?
-    pub(crate) fn is_started(&self, goal: Goal) -> bool {
+    pub(crate) fn is_started(&self, goal: ServoGoal) -> bool {
         self.target == i64::from(goal.position_counts) * COUNT
     }
 
@@ -216,7 +216,7 @@ impl Motor {
         self.duty = (aim * FULL_DUTY / self.full_error.max(1)).clamp(-FULL_DUTY, FULL_DUTY);
     }
 
-    /// The speed in this step, if no obstacle is in the way.
+    /// The speed in this step, if no stiff obstacle and no end is in the way.
     fn next_speed(&self) -> i64 {
         let drag = match self.mode {
             MotorMode::Damped => self.gear.0.damped_drag,

@@ -26,7 +26,7 @@ pub(super) struct ServoRegisters {
 
 /// A goal position with its time and speed: registers 42 to 47.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Goal {
+pub(super) struct ServoGoal {
     /// The goal position, 0 to 1023.
     pub(super) position_counts: u16,
     /// The duration of the move, in milliseconds; ignored unless the speed is 0.
@@ -175,10 +175,10 @@ impl ServoRegisters {
     }
 
     /// The goal, within the position limits of the EEPROM and 1023.
-    pub(super) fn goal(&self) -> Goal {
+    pub(super) fn goal(&self) -> ServoGoal {
         let word = |register| u16::from_be_bytes(self.field(register));
         let (lowest, highest) = (word(register::MIN_POSITION), word(register::MAX_POSITION));
-        Goal {
+        ServoGoal {
             position_counts: word(register::GOAL_POSITION)
                 .min(highest)
                 .max(lowest)
@@ -189,7 +189,7 @@ impl ServoRegisters {
     }
 
     /// The goal, if any part of it was written since the last call. A new goal starts a move, even to the same position.
-    pub(super) fn take_new_goal(&mut self) -> Option<Goal> {
+    pub(super) fn take_new_goal(&mut self) -> Option<ServoGoal> {
         core::mem::take(&mut self.has_new_goal).then(|| self.goal())
     }
 

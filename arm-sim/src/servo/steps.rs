@@ -21,7 +21,6 @@ impl Servo {
         let mode = self.motor_mode(now);
         self.count_stuck(1);
         if self.is_at_rest(mode, supply_decivolts) {
-            // Most steps change nothing.
             self.protection.rest();
             return false;
         }

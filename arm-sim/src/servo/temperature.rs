@@ -36,8 +36,7 @@ impl Temperature {
         UPDATE_STEPS.saturating_sub(self.steps + 1)
     }
 
-    /// Adds `count` steps with this torque, in 0.1 % of the stall torque. A `count` above 1 must not exceed
-    /// [`Temperature::steps_to_update`].
+    /// Adds `count` steps with this torque, in 0.1 % of the stall torque. They must not go beyond the next update.
     pub(super) fn steps(&mut self, torque: i16, count: u32) {
         let torque = u64::from(torque.unsigned_abs());
         self.squares += torque * torque * u64::from(count);

@@ -47,7 +47,7 @@ impl<F: NorFlash, C: ArmController> SimulatedArm<F, Plant, C> {
     }
 }
 
-/// Carries out the actions on the simulated servos and their surroundings. [`SimulatedArm::act`] handles all others.
+/// Carries out the actions that change nothing but the plant. [`SimulatedArm::act`] handles all others.
 fn act_on_plant(plant: &mut Plant, action: Action) {
     match action {
         Action::Hand(joint, counts) => plant.move_by_hand(joint, counts),

@@ -46,8 +46,7 @@ impl<F: NorFlash, C: ArmController> SimulatedArm<F, Plant, C> {
         self.to_host.set_bytewise();
     }
 
-    /// Adds a fault at `now`, for `duration` or until [`SimulatedArm::end_faults`]. Returns the report of the fault that it
-    /// replaces.
+    /// Adds a fault at `now`, for `duration` or until it is removed. Returns the report of the fault that it replaces.
     pub fn set_fault(
         &mut self,
         now: Instant,
@@ -102,7 +101,8 @@ impl<F: NorFlash, C: ArmController> SimulatedArm<F, Plant, C> {
         self.ended_faults.take()
     }
 
-    /// Is a byte of the host on the way to the controller, or one of the controller on the way to the host?
+    /// Is a byte of the host on the way to the controller, or one of the controller on the way to the host? Bytes that wait for a
+    /// halted controller, or for room on the line to the host, do not count.
     #[must_use]
     pub fn is_host_line_busy(&self) -> bool {
         let waits = !self.is_halted && !self.to_arm.arrived().is_empty() && self.to_host.room() > 0;

@@ -7,7 +7,7 @@ use protocol_core::registers::map::{SPEED, TIME};
 use protocol_core::registers::{JOINTS, Joint};
 
 use super::registers::StockRegisters;
-use super::servo_master::ServoGoal;
+use super::servo_master::StockGoal;
 
 /// Speed in counts per second, and time, of the first goals after the move at start.
 const SPEED_AT_START: u16 = 600;
@@ -35,7 +35,7 @@ impl LastGoals {
     }
 
     /// The goals of all joints for their last targets, to be reached within this time.
-    pub(super) fn within(&self, time_ms: u16, registers: &StockRegisters) -> Vec<(Joint, ServoGoal)> {
+    pub(super) fn within(&self, time_ms: u16, registers: &StockRegisters) -> Vec<(Joint, StockGoal)> {
         let goals = Joint::ALL.into_iter().zip(self.0);
         goals.map(|(joint, goal)| LastGoal { speed: 0, time_ms, ..goal }.of_servo(joint, registers)).collect()
     }
@@ -58,7 +58,7 @@ impl LastGoals {
         &mut self,
         targets: [Option<u8>; JOINTS],
         registers: &StockRegisters,
-    ) -> Vec<(Joint, ServoGoal)> {
+    ) -> Vec<(Joint, StockGoal)> {
         let mut goals = Vec::new();
         for ((joint, goal), target) in Joint::ALL.into_iter().zip(&mut self.0).zip(targets) {
             if let Some(target) = target.filter(|&target| target != goal.target) {
@@ -71,9 +71,9 @@ impl LastGoals {
 }
 
 impl LastGoal {
-    fn of_servo(self, joint: Joint, registers: &StockRegisters) -> (Joint, ServoGoal) {
+    fn of_servo(self, joint: Joint, registers: &StockRegisters) -> (Joint, StockGoal) {
         let angle = MicroDegrees::from_degrees(self.target);
         let position_counts = counts_from_angle(joint, angle, registers.offset(joint));
-        (joint, ServoGoal { position_counts, time_ms: self.time_ms, speed: self.speed })
+        (joint, StockGoal { position_counts, time_ms: self.time_ms, speed: self.speed })
     }
 }

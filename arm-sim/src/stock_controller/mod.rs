@@ -6,7 +6,7 @@
 //! ```
 //!
 //! It exists to test host programs: it checks no range, refuses nothing, has no status block, sends text between its
-//! frames, and does nothing else while it beeps. The move to the standard pose at start and the timeout of a servo are
+//! frames, and executes no request while it beeps. The move to the standard pose at start and the timeout of a servo are
 //! assumed. The WebSocket, the buttons and the defects of the maker's inverse kinematics are not simulated.
 
 mod feedback;
@@ -29,7 +29,7 @@ use protocol_core::registers::map21::{
     ANGLE_FEEDBACK_FREQUENCY, LOAD_FEEDBACK_FREQUENCY, PRESENT_ANGLE, PRESENT_LOAD,
 };
 use protocol_core::registers::{Image, JOINTS, Joint};
-use protocol_core::request::{Alarm, Reply, Report};
+use protocol_core::request::{Alarm, Reply, ReportMap21};
 use protocol_core::settings::Storage;
 use protocol_core::time::{Duration, Instant};
 use protocol_core::wire::FrameBuffer;
@@ -46,7 +46,7 @@ use servo_master::{ReadOutcome, ServoMaster};
 /// After power-up the arm executes no request for this long. Then it moves to the standard pose.
 const BOOT_TIME: Duration = Duration::from_millis(500);
 const WAKE_UP_MS: u16 = 2_000;
-/// How long an alarm beeps. The arm does nothing else meanwhile.
+/// How long an alarm beeps. Meanwhile the arm executes no request and sends no feedback.
 const BEEP: Duration = Duration::from_millis(100);
 const BANNER: &[u8] = b"7Bot V2, firmware 2.1.4\r\n";
 const BEEP_ON: &[u8] = b"Buzzer ON - Note: 2, Freq: 330\r\n";
@@ -233,7 +233,7 @@ impl StockController {
             let values = &self.registers.read(address, count);
             self.send(|frame| {
                 if is_report {
-                    Report { address, values }.encode(frame);
+                    ReportMap21 { address, values }.encode(frame);
                 } else {
                     Reply { address, values }.encode(frame);
                 }

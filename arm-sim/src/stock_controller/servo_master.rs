@@ -9,7 +9,7 @@ use protocol_core::time::{Duration, Instant};
 
 /// A goal of a servo, as the maker's firmware sends it: time and speed together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct ServoGoal {
+pub(super) struct StockGoal {
     pub(super) position_counts: u16,
     pub(super) time_ms: u16,
     /// In counts per second.
@@ -57,7 +57,7 @@ impl ServoMaster {
         self.sync_write(register::TORQUE_SWITCH, items);
     }
 
-    pub(super) fn set_goals(&mut self, goals: impl Iterator<Item = (Joint, ServoGoal)>) {
+    pub(super) fn set_goals(&mut self, goals: impl Iterator<Item = (Joint, StockGoal)>) {
         let items = goals.map(|(joint, goal)| {
             let [p1, p0] = goal.position_counts.to_be_bytes();
             let [t1, t0] = goal.time_ms.to_be_bytes();

@@ -10,7 +10,7 @@ pub(super) const UP: Point = Vector { x: 0.0, y: 0.0, z: 1.0 };
 /// A point and three directions at right angles to each other.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Frame {
+pub struct SolidFrame {
     /// Its origin, in mm.
     pub origin: Vector<f64>,
     /// The direction of its x axis.
@@ -21,7 +21,7 @@ pub struct Frame {
     pub z: Vector<f64>,
 }
 
-impl Frame {
+impl SolidFrame {
     /// An upright frame, rotated about z by `turn` degrees, anticlockwise seen from above.
     pub(super) fn upright(origin: Point, turn: f64) -> Self {
         let (sine, cosine) = Float::sin_cos(turn);

@@ -11,7 +11,7 @@
 use kinematics::geometry::{CLAW_MAX, DISC_RADIUS, FINGER_AXIS, FINGER_BEND, FINGER_END};
 use kinematics::{Float, Frames, Vector, forward};
 
-use super::frame::{Frame, Point, UP};
+use super::frame::{Point, SolidFrame, UP};
 use crate::scene::Tool;
 
 /// The radius of a finger's end, in mm.
@@ -50,7 +50,7 @@ pub(super) struct Hand {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Grip {
     /// Its origin is between the pads; x points along the tool, y from one pad to the other.
-    pub(super) frame: Frame,
+    pub(super) frame: SolidFrame,
     /// The distance between the pads, in mm.
     pub(super) gap: f64,
 }
@@ -62,16 +62,16 @@ impl Hand {
     }
 
     /// The axes of the tool, at its tip: x along the tool, y to one finger.
-    pub(super) fn tip(&self) -> Frame {
+    pub(super) fn tip(&self) -> SolidFrame {
         let hand = &self.frames.hand;
-        Frame { origin: hand.tip, x: hand.tool, y: hand.disc, z: hand.tool.cross(hand.disc) }
+        SolidFrame { origin: hand.tip, x: hand.tool, y: hand.disc, z: hand.tool.cross(hand.disc) }
     }
 
     pub(super) fn grip(&self) -> Grip {
         let [ahead, aside] = finger_point(FINGER_END, self.claw);
         let tip = self.tip();
         let middle = tip.point(Vector::new(ahead - PAD / 2.0, 0.0, 0.0));
-        Grip { frame: Frame { origin: middle, ..tip }, gap: gap(aside) }
+        Grip { frame: SolidFrame { origin: middle, ..tip }, gap: gap(aside) }
     }
 
     /// All balls of an arm with this tool.

@@ -29,7 +29,7 @@ use kinematics::Vector;
 use protocol_core::registers::JOINTS;
 
 use crate::scene::{Block, Item, Scene, Tool};
-pub use frame::Frame;
+pub use frame::SolidFrame;
 use frame::{Point, UP};
 use hand::{Ball, Grip, Hand, angle_for};
 use solid::Solid;
@@ -48,7 +48,7 @@ pub struct Object {
     /// Its name, form and weight, and its initial position.
     pub item: Item,
     /// Its present position: the origin is its middle.
-    pub frame: Frame,
+    pub frame: SolidFrame,
     /// Do the claws or the cup hold it? Then it moves with the tip, and does not fall.
     pub is_carried: bool,
     solid: Solid,
@@ -100,12 +100,12 @@ pub(crate) struct Effect {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct World {
     scene: Scene,
-    walls: Vec<(Frame, Solid)>,
+    walls: Vec<(SolidFrame, Solid)>,
     objects: Vec<Object>,
     /// The object between the claws, carried or not.
     between: Option<usize>,
     /// The carried object, and its frame relative to the tip.
-    carried: Option<(usize, Frame)>,
+    carried: Option<(usize, SolidFrame)>,
     /// An object was torn off the cup. The cup takes no object until the pump was switched off.
     is_torn_off: bool,
     is_moving: bool,
@@ -118,7 +118,7 @@ impl World {
         let table = scene.table;
         let wall = |Block { at: [x, y], size, .. }: &Block| {
             let [_, _, height] = *size;
-            let frame = Frame::upright(Vector::new(*x, *y, table + height / 2.0), 0.0);
+            let frame = SolidFrame::upright(Vector::new(*x, *y, table + height / 2.0), 0.0);
             (frame, Solid::Box(size.map(|edge| edge / 2.0)))
         };
         let walls = scene.walls.iter().map(wall).collect();
@@ -141,7 +141,7 @@ impl World {
         let solid = Solid::from(item.form);
         let [x, y] = item.at;
         let top = self.support(None, Vector::new(x, y, f64::MAX));
-        let frame = Frame::upright(Vector::new(x, y, top + solid.half_height()), item.turn);
+        let frame = SolidFrame::upright(Vector::new(x, y, top + solid.half_height()), item.turn);
         self.objects.push(Object { item, frame, is_carried: false, solid, speed: 0.0 });
     }
 
@@ -217,13 +217,13 @@ impl World {
         self.between = None;
         if let Some(object) = self.objects.get_mut(index) {
             object.is_carried = false;
-            object.frame = Frame::upright(object.frame.origin, object.frame.turn());
+            object.frame = SolidFrame::upright(object.frame.origin, object.frame.turn());
             self.is_moving = true;
         }
     }
 
     /// The object at the end of the cup.
-    fn at_cup(&self, tip: &Frame) -> Option<usize> {
+    fn at_cup(&self, tip: &SolidFrame) -> Option<usize> {
         let end = tip.point(Vector::new(hand::CUP, 0.0, 0.0));
         self.objects.iter().position(|object| {
             let touch = object.solid.touch(&object.frame, end, SUCTION);

@@ -2,7 +2,7 @@
 
 use kinematics::{Float, Vector};
 
-use super::frame::{Frame, Point};
+use super::frame::{Point, SolidFrame};
 use crate::scene::Form;
 
 /// A form, centred on the origin of its frame.
@@ -52,7 +52,7 @@ impl Solid {
     }
 
     /// How far the solid reaches from its middle in this direction, in mm.
-    pub(super) fn reach(self, frame: &Frame, direction: Point) -> f64 {
+    pub(super) fn reach(self, frame: &SolidFrame, direction: Point) -> f64 {
         let [x, y, z] = [frame.x, frame.y, frame.z].map(|axis| axis.dot(direction).abs());
         match self {
             Self::Box([half_x, half_y, half_z]) => half_x * x + half_y * y + half_z * z,
@@ -63,7 +63,7 @@ impl Solid {
     }
 
     /// The contact with a ball of this radius round a point, at the nearest face. `None`: they do not touch.
-    pub(super) fn touch(self, frame: &Frame, point: Point, ball: f64) -> Option<Touch> {
+    pub(super) fn touch(self, frame: &SolidFrame, point: Point, ball: f64) -> Option<Touch> {
         let Vector { x, y, z } = frame.local(point);
         let above = |value: f64, axis: Point| if value < 0.0 { -axis } else { axis };
         let faces = match self {
@@ -86,7 +86,7 @@ impl Solid {
     }
 
     /// The corners, for contacts with other solids. For a cylinder: the corners of the largest box with a square base inside it.
-    pub(super) fn corners(self, frame: &Frame) -> [Point; 8] {
+    pub(super) fn corners(self, frame: &SolidFrame) -> [Point; 8] {
         let [x, y, z] = match self {
             Self::Box(half) => half,
             Self::Cylinder { radius, half_height } => {

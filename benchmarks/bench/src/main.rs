@@ -22,8 +22,8 @@
 //!   timeouts (D4, D15, D16). No peer does.
 //! * A Modbus server replies to a write; the others do not.
 //! * Frames differ in length (the table prints it): MAVLink names sender and receiver.
-//! * COBS finds a frame by a zero, MAVLink by its header; a damaged zero or length can hide the frames that follow. On a
-//!   line, silence separates Modbus frames. In a stream, a Modbus server skips one byte when a frame is invalid.
+//! * COBS finds a frame by a zero, so a damaged zero can hide the frame that follows. MAVLink finds a frame by its header. On a
+//!   line, silence separates Modbus frames. In a stream, a Modbus or MAVLink server skips one byte when a frame is invalid.
 //!
 //! The peers get a receive buffer that moves its bytes as rarely as ours.
 

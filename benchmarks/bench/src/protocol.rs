@@ -1,5 +1,6 @@
 //! Frames of each protocol for the same operation, built from the protocols' specifications with the `crc` crate.
-//! None of the measured code is used, so the expected bytes are independent of it.
+//! Apart from that crate, which the postcard server uses too, none of the measured code is used. So the expected bytes are
+//! independent of it.
 //!
 //! A Modbus register holds two bytes. An odd number of bytes is rounded up to whole registers: a write also carries
 //! the current value of the byte that follows.

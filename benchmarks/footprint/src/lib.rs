@@ -1,5 +1,5 @@
-//! Shared parts of the measuring programs: inputs that the compiler cannot evaluate, and a panic handler that must not be
-//! linked.
+//! Shared parts of the measuring programs: inputs that the compiler cannot evaluate, and a panic handler, which the programs
+//! of `cargo xtask no-panic` must not contain.
 //!
 //! The programs call parts of the cores, kinematics, or peers of `cargo xtask bench`. Inputs and outputs pass through
 //! [`opaque`], so the compiler can neither evaluate nor remove the calls. `xtask` inspects the linked images, and runs those

@@ -19,7 +19,7 @@ const READ: u8 = 3;
 const WRITE: u8 = 6;
 /// Zeros that complete an unfinished frame at the end of the stream.
 const FILLER: [u8; 64] = [0; 64];
-/// Repetitions of [`FILLER`] that exceed the longest frame (280 bytes).
+/// Repetitions of [`FILLER`] that exceed the longest frame (283 bytes).
 const FILLERS: usize = 5;
 
 /// The received bytes, as the source that the reader reads from.

@@ -14,7 +14,7 @@ use protocol_core::time::{Duration, Instant};
 
 use crate::connection::ConnectionId;
 use crate::desk::Desk;
-use crate::message::{FromPupil, LeaseEnd, Presence, Refusal};
+use crate::message::{FromPupil, LeaseEnd, Refusal, TabPresence};
 use crate::name;
 use crate::pupil::Pupil;
 use crate::real_arm::{ArmNews, RealArm};
@@ -45,7 +45,7 @@ pub struct ClassInfo {
 pub struct LeaseId(u32);
 
 #[derive(Debug)]
-enum Connection {
+enum TabConnection {
     /// A tab that has not joined yet, the key that it gets if it becomes a new pupil, and when it connected.
     Stranger {
         key: String,
@@ -59,7 +59,7 @@ enum Connection {
 }
 
 #[derive(Clone, Copy, Debug)]
-enum Refused {
+enum RefusedTab {
     Pupil(Refusal),
     Teacher,
 }
@@ -70,7 +70,7 @@ pub struct Classroom {
     info: ClassInfo,
     pupils: BTreeMap<u32, Pupil>,
     next_pupil: u32,
-    connections: BTreeMap<ConnectionId, Connection>,
+    connections: BTreeMap<ConnectionId, TabConnection>,
     next_connection: u64,
     arm: Option<RealArm>,
     stop: Option<StopAll>,
@@ -100,23 +100,23 @@ impl Classroom {
     /// Adds the connection of a pupil's tab; refuses it if [`MOST_PUPILS`] tabs are connected. `key` is a new secret: a tab
     /// that knows it belongs to this pupil.
     pub fn open_pupil(&mut self, now: Instant, key: String) -> ConnectionId {
-        let pupils = |connection: &&Connection| {
-            matches!(connection, Connection::Stranger { .. } | Connection::Pupil(_))
+        let pupils = |connection: &&TabConnection| {
+            matches!(connection, TabConnection::Stranger { .. } | TabConnection::Pupil(_))
         };
         let is_full = self.connections.values().filter(pupils).count() >= MOST_PUPILS;
-        let refused = Connection::Refused(Some(Refused::Pupil(Refusal::Full)));
-        self.open(if is_full { refused } else { Connection::Stranger { key, since: now } })
+        let refused = TabConnection::Refused(Some(RefusedTab::Pupil(Refusal::Full)));
+        self.open(if is_full { refused } else { TabConnection::Stranger { key, since: now } })
     }
 
     /// Adds the connection of a teacher's screen. Refuses it if there are too many.
     pub fn open_teacher(&mut self) -> ConnectionId {
-        let teachers = |connection: &&Connection| matches!(connection, Connection::Teacher(_));
+        let teachers = |connection: &&TabConnection| matches!(connection, TabConnection::Teacher(_));
         let is_full = self.connections.values().filter(teachers).count() >= MOST_TEACHERS;
-        let refused = Connection::Refused(Some(Refused::Teacher));
-        self.open(if is_full { refused } else { Connection::Teacher(Desk::default()) })
+        let refused = TabConnection::Refused(Some(RefusedTab::Teacher));
+        self.open(if is_full { refused } else { TabConnection::Teacher(Desk::default()) })
     }
 
-    fn open(&mut self, connection: Connection) -> ConnectionId {
+    fn open(&mut self, connection: TabConnection) -> ConnectionId {
         let id = ConnectionId::new(self.next_connection);
         self.next_connection += 1;
         self.connections.insert(id, connection);
@@ -125,7 +125,7 @@ impl Classroom {
 
     /// Notes that a connection has ended. A pupil who has the real arm loses it.
     pub fn close(&mut self, now: Instant, id: ConnectionId) {
-        let Some(Connection::Pupil(number)) = self.connections.remove(&id) else { return };
+        let Some(TabConnection::Pupil(number)) = self.connections.remove(&id) else { return };
         if let Some(pupil) = self.pupils.get_mut(&number) {
             pupil.lose(now);
         }
@@ -137,7 +137,7 @@ impl Classroom {
     pub fn receive(&mut self, now: Instant, id: ConnectionId, text: &str) {
         let Some(connection) = self.connections.get(&id) else { return };
         let is_taken = match connection {
-            Connection::Stranger { key, .. } => match serde_json::from_str(text) {
+            TabConnection::Stranger { key, .. } => match serde_json::from_str(text) {
                 Ok(FromPupil::Join { name, key: known }) => {
                     let key = key.clone();
                     self.join(now, id, &name, key, known.as_deref());
@@ -145,13 +145,13 @@ impl Classroom {
                 }
                 _ => false,
             },
-            &Connection::Pupil(number) => {
+            &TabConnection::Pupil(number) => {
                 serde_json::from_str(text).is_ok_and(|message| self.hear_pupil(now, number, message))
             }
-            Connection::Teacher(_) => {
+            TabConnection::Teacher(_) => {
                 serde_json::from_str(text).map(|message| self.hear_teacher(now, id, message)).is_ok()
             }
-            Connection::Refused(_) => true,
+            TabConnection::Refused(_) => true,
         };
         if !is_taken {
             self.refuse(now, id, Refusal::BadMessage);
@@ -159,7 +159,7 @@ impl Classroom {
         self.change += 1;
     }
 
-    /// Ends a connection with a reason.
+    /// Ends a connection. A pupil is told the reason.
     fn refuse(&mut self, now: Instant, id: ConnectionId, why: Refusal) {
         self.close(now, id);
         self.connections.insert(id, Connection::Refused(Some(Refused::Pupil(why))));
@@ -182,9 +182,9 @@ impl Classroom {
                 None
             }
         };
-        self.connections.insert(id, Connection::Pupil(number));
+        self.connections.insert(id, TabConnection::Pupil(number));
         if let Some(old) = old {
-            self.connections.insert(old, Connection::Refused(Some(Refused::Pupil(Refusal::OtherTab))));
+            self.connections.insert(old, TabConnection::Refused(Some(RefusedTab::Pupil(Refusal::OtherTab))));
         }
         self.end_lease_of(now, number, LeaseEnd::Lost);
     }
@@ -206,15 +206,15 @@ impl Classroom {
     pub fn poll(&mut self, now: Instant) {
         self.pupils.values_mut().for_each(|pupil| pupil.poll(now));
         for connection in self.connections.values_mut() {
-            if matches!(connection, Connection::Stranger { since, .. } if now - *since >= JOIN_TIME) {
-                *connection = Connection::Refused(Some(Refused::Pupil(Refusal::BadMessage)));
+            if matches!(connection, TabConnection::Stranger { since, .. } if now - *since >= JOIN_TIME) {
+                *connection = TabConnection::Refused(Some(RefusedTab::Pupil(Refusal::BadMessage)));
             }
         }
         let Some(lease) = self.lease_now() else { return self.forget_lost(now) };
         let holder = self.pupils.get(&lease.pupil);
         if lease.is_over(now) {
             self.end_lease(now, LeaseEnd::Time);
-        } else if holder.is_none_or(|pupil| pupil.presence(now) != Presence::Here) {
+        } else if holder.is_none_or(|pupil| pupil.presence(now) != TabPresence::Here) {
             self.end_lease(now, LeaseEnd::Lost);
         }
         self.forget_lost(now);

@@ -2,10 +2,10 @@
 
 use protocol_core::time::Instant;
 
-use super::{Classroom, Connection};
+use super::{Classroom, TabConnection};
 use crate::connection::ConnectionId;
 use crate::lease::Lease;
-use crate::message::{FromPupil, FromTeacher, LONGEST_TEXT, LeaseEnd, NotGiven, Presence};
+use crate::message::{FromPupil, FromTeacher, LONGEST_TEXT, LeaseEnd, NotGiven, TabPresence};
 use crate::pupil::Pupil;
 use crate::stop_all::{PendingStop, StopAll};
 
@@ -36,7 +36,8 @@ impl Classroom {
             }
             FromTeacher::Give { pupil, seconds } => {
                 let given = self.give(now, pupil, seconds);
-                if let (Err(why), Some(Connection::Teacher(desk))) = (given, self.connections.get_mut(&id)) {
+                if let (Err(why), Some(TabConnection::Teacher(desk))) = (given, self.connections.get_mut(&id))
+                {
                     desk.refuse(why);
                 }
             }
@@ -53,7 +54,7 @@ impl Classroom {
     }
 
     fn give(&mut self, now: Instant, number: u32, seconds: u32) -> Result<(), NotGiven> {
-        let is_there = |pupil: &Pupil| pupil.presence(now) == Presence::Here;
+        let is_there = |pupil: &Pupil| pupil.presence(now) == TabPresence::Here;
         let lease = self.arm.as_mut().ok_or(NotGiven::NoArm)?.new_lease(now, number, seconds)?;
         if !self.pupils.get(&number).is_some_and(is_there) {
             return Err(NotGiven::PupilGone);

@@ -3,20 +3,20 @@
 use protocol_core::time::Instant;
 use serde::Serialize;
 
-use super::{ClassInfo, Classroom, Connection, Refused};
+use super::{ClassInfo, Classroom, RefusedTab, TabConnection};
 use crate::connection::ConnectionId;
 use crate::message::{ClassNews, LentArm, StopNews, ToPupil, ToTeacher};
 
 impl Classroom {
     /// The connections for which a message is due.
     pub fn ready(&self, now: Instant) -> impl Iterator<Item = ConnectionId> {
-        let has_message = move |connection: &Connection| match connection {
-            Connection::Stranger { .. } => false,
-            Connection::Pupil(number) => {
+        let has_message = move |connection: &TabConnection| match connection {
+            TabConnection::Stranger { .. } => false,
+            TabConnection::Pupil(number) => {
                 self.pupils.get(number).is_some_and(|pupil| pupil.has_message(now, self.message.0))
             }
-            Connection::Teacher(desk) => desk.has_message(now, self.change),
-            Connection::Refused(why) => why.is_some(),
+            TabConnection::Teacher(desk) => desk.has_message(now, self.change),
+            TabConnection::Refused(why) => why.is_some(),
         };
         self.connections.iter().filter(move |(_, connection)| has_message(connection)).map(|(&id, _)| id)
     }
@@ -25,15 +25,15 @@ impl Classroom {
     pub fn next_message(&mut self, now: Instant, id: ConnectionId) -> Option<String> {
         let mut connection = self.connections.remove(&id)?;
         let message = match &mut connection {
-            Connection::Stranger { .. } => None,
-            Connection::Pupil(number) => self.for_pupil(now, *number),
-            Connection::Teacher(desk) => desk
+            TabConnection::Stranger { .. } => None,
+            TabConnection::Pupil(number) => self.for_pupil(now, *number),
+            TabConnection::Teacher(desk) => desk
                 .next_message(now, self.change, || self.welcome(), || ToTeacher::Class(self.class(now)))
                 .as_ref()
                 .and_then(json),
-            Connection::Refused(why) => why.take().and_then(|why| match why {
-                Refused::Pupil(why) => json(&ToPupil::Refused(why)),
-                Refused::Teacher => json(&ToTeacher::Full),
+            TabConnection::Refused(why) => why.take().and_then(|why| match why {
+                RefusedTab::Pupil(why) => json(&ToPupil::Refused(why)),
+                RefusedTab::Teacher => json(&ToTeacher::Full),
             }),
         };
         self.connections.insert(id, connection);
@@ -43,7 +43,7 @@ impl Classroom {
     /// True if the connection has got its last message, and has to be closed. Also for an unknown connection.
     #[must_use]
     pub fn is_over(&self, id: ConnectionId) -> bool {
-        matches!(self.connections.get(&id), None | Some(Connection::Refused(None)))
+        matches!(self.connections.get(&id), None | Some(TabConnection::Refused(None)))
     }
 
     fn for_pupil(&mut self, now: Instant, number: u32) -> Option<String> {

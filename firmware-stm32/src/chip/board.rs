@@ -1,4 +1,4 @@
-//! The reference board: pins, clocks, priorities and times. For other wiring, edit only this file.
+//! The reference board: pins, clocks, priorities and times. For other pins of the same USARTs, edit only this file.
 //!
 //! ```text
 //!   PA9   USART1 TX ──▶ host          PC6   pump, high = on
@@ -32,7 +32,7 @@ pub const SERVO_BUS: Pin = Pin::new(GpioPort::A, 2);
 /// The direction pin of a buffered servo bus, and its level while the board drives the bus. On a bus without a buffer, leave the
 /// pin unconnected; `None` if it has another use.
 pub const SERVO_DIRECTION: Option<(Pin, Active)> = Some((Pin::new(GpioPort::A, 1), Active::High));
-/// Alternate function of the pins above: USART1 and USART2 (DS8626, table 9).
+/// Alternate function of the pins of USART1 and USART2 (DS8626, table 9).
 pub const USART_FUNCTION: u8 = 7;
 /// The servos' baud rate as delivered.
 pub const SERVO_BAUD: u32 = 1_000_000;

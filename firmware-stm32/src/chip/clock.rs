@@ -40,7 +40,8 @@ const _: () = assert!(clock_rates::INTERNAL_HZ == INTERNAL_MHZ as u32 * 1_000_00
 pub struct StartedClock {
     /// The source of the core clock.
     pub source: ClockSource,
-    /// The crystal as measured against the internal oscillator; `None` if it did not start or could not be measured.
+    /// The crystal as measured against the internal oscillator; `None` if it did not start or could not be measured, and in the
+    /// emulator.
     pub crystal_khz: Option<u32>,
 }
 
@@ -117,8 +118,9 @@ fn is_emulated(rcc: &pac::RCC, dbgmcu: &pac::DBGMCU) -> bool {
         && dbgmcu.idcode().read().bits() == 0
 }
 
-/// Locks the PLL at 1 MHz x 336 / 2 = 168 MHz. Returns false if it does not lock. An input of 1 MHz serves every crystal of
-/// whole megahertz; the 2 MHz that RM0090 recommends would give less jitter, but exclude a crystal of 25 MHz.
+/// Locks the PLL at 1 MHz x 336 / 2 = 168 MHz. Returns false if it does not stop before, or does not lock. An input of 1 MHz
+/// serves every crystal of whole megahertz; the 2 MHz that RM0090 recommends would give less jitter, but exclude a crystal of
+/// 25 MHz.
 fn lock_pll(rcc: &pac::RCC, input_mhz: u8, from_crystal: bool) -> bool {
     rcc.cr().modify(|_, w| w.pllon().off());
     if !wait_for(READY_POLLS, || rcc.cr().read().pllrdy().is_not_ready()) {
@@ -151,7 +153,7 @@ fn switch_to_pll(rcc: &pac::RCC, flash: &pac::FLASH) -> bool {
     switched
 }
 
-/// Enables the clocks of the peripherals. The reads give them the delay that they need before the first access (errata
+/// Enables the clocks of TIM2, PWR and the USARTs. The reads give them the delay that they need before the first access (errata
 /// ES0182, delay after an RCC peripheral clock enabling).
 pub fn enable_peripherals(rcc: &pac::RCC) {
     rcc.apb1enr().modify(|_, w| w.tim2en().enabled().usart2en().enabled().pwren().enabled());

@@ -1,8 +1,9 @@
 //! The crash handler: pump and valve off, servos damped, one log line, restart. After the restart the controller sends only
-//! questions until the servos are measured ([D12](protocol_core::decisions#d12)), so they stay damped.
+//! questions until the servos are measured ([D12](protocol_core::decisions#d12)), so they stay damped until then.
 //!
-//! This file needs no heap, no lock, no interrupt and no intact stack, and each of its loops has a limit. It stores the
-//! cause in RAM that a restart does not clear; after the restart the status block reports it.
+//! This file needs no heap, no lock and no interrupt, and after a hard fault no intact stack. Each of its loops has a limit. It
+//! stores the cause in RAM that a restart does not clear; after the restart the log names the cause, and register 241 shows a
+//! watchdog restart.
 
 use core::arch::naked_asm;
 use core::panic::PanicInfo;
@@ -93,8 +94,8 @@ fn stop_servos() {
     }
 }
 
-/// Corrects the baud rate if the crystal has just stopped. The chip then runs on its internal oscillator, with the bus
-/// divider still set for the PLL. Returns the present rates.
+/// Corrects the baud rate if the chip runs on its internal oscillator: if the crystal has just stopped, the bus divider is still
+/// set for the PLL. Returns the present rates.
 fn keep_rate(usart: &pac::USART2, rcc: &pac::RCC) -> ClockRates {
     if !rcc.cfgr().read().sws().is_hsi() {
         return ClockSource::Crystal.rates();

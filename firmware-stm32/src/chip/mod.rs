@@ -1,7 +1,7 @@
 //! The drivers of the chip: registers, interrupts, and the handlers of crashes. `board.rs` is the table of the pins.
 //!
 //! Firmware and self-test image link the same drivers, but only the self-test reads the ADC, and only the firmware writes the
-//! flash. The drivers are tested in the emulator. The other files of the library are logic, tested on the host.
+//! flash. The drivers of what the emulator has are tested there. The other files of the library are logic, tested on the host.
 
 pub mod adc;
 pub mod board;

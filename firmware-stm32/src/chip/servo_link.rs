@@ -19,7 +19,7 @@ const RECEIVE: usize = 128;
 const TRANSMIT: usize = 128;
 
 /// The servo bus as the main loop uses it.
-pub type ServoLink = UartPort<USART2, ServoDirection, RECEIVE, TRANSMIT>;
+pub type ServoUart = UartPort<USART2, ServoDirection, RECEIVE, TRANSMIT>;
 
 static LINE: SharedUart<USART2, ServoDirection, RECEIVE, TRANSMIT> = SharedUart::new(ServoDirection);
 
@@ -56,7 +56,7 @@ impl BusDirection for ServoDirection {
 }
 
 /// Opens the servo bus at [`board::SERVO_BAUD`], half duplex. The board listens.
-pub fn open(usart: USART2, rates: ClockRates, nvic: &mut NVIC) -> ServoLink {
+pub fn open(usart: USART2, rates: ClockRates, nvic: &mut NVIC) -> ServoUart {
     ServoDirection.open();
     board::SERVO_BUS.give_to(board::USART_FUNCTION, OutputType::OpenDrain);
     let divisor = clock_rates::usart_divisor(rates.apb1, board::SERVO_BAUD);

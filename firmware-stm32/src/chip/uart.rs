@@ -11,8 +11,8 @@
 //! interrupt, because in QEMU 7.2 an empty transmitter does not raise it.
 //!
 //! If the receive queue is full, the byte stays in the USART and the interrupt stays masked until the loop reads the
-//! queue or waits. In the emulator the sender then waits. On a wire, an overrun occurs when the next byte is complete. Overruns
-//! and all other receive errors are counted.
+//! queue or waits. In the emulator the sender then waits. On a wire, an overrun occurs when the next byte is complete.
+//! Overruns, framing errors and noise are counted.
 //!
 //! Both sides access the line in critical sections. A byte of the servo bus has to be read within 10 microseconds. So the loop
 //! moves at most [`CHUNK`] bytes in a section, which takes less than that, even on the internal oscillator.
@@ -106,8 +106,8 @@ impl<U: Usart, D: BusDirection, const RECEIVE: usize, const TRANSMIT: usize>
         Self(Mutex::new(RefCell::new(SerialLine::new(RegistersOf(PhantomData), direction))))
     }
 
-    /// Opens the line and unmasks its interrupt. USART settings that are not in `setup` keep their reset values. Takes the
-    /// USART, so that no other code uses it.
+    /// Opens the line: enables transmitter, receiver and interrupt. Other USART settings that are not in `setup` keep their reset
+    /// values. Takes the USART, so that no other code uses it.
     pub fn open(&'static self, _: U, setup: &Setup, nvic: &mut NVIC) -> UartPort<U, D, RECEIVE, TRANSMIT> {
         let usart = U::registers();
         let [low, high] = setup.divisor.to_le_bytes();
@@ -130,7 +130,7 @@ impl<U: Usart, D: BusDirection, const RECEIVE: usize, const TRANSMIT: usize>
         });
     }
 
-    /// Unmasks the interrupt, which is masked while the receive queue is full.
+    /// Unmasks the interrupt. [`Self::serve`] masks it when a byte finds the receive queue full.
     fn unmask(&self) {
         // SAFETY: no code relies on this interrupt being masked.
         unsafe { NVIC::unmask(U::INTERRUPT) };

@@ -11,7 +11,9 @@ use protocol_core::registers::Joint;
 use protocol_core::time::{Duration, Instant};
 use serde_json::{Value, json};
 
-use super::request::{self, Alarm, ControlRefusal, ControlRequest, Grip, HandAction, Power, SpeedFactor};
+use super::request::{
+    self, ControlRefusal, ControlRequest, ForcedAlarm, HandAction, HandGrip, Power, SpeedFactor,
+};
 use super::socket::ControlReply;
 use super::state;
 use crate::pty_arm::PtyArm;
@@ -170,31 +172,31 @@ impl<F: NorFlash + Clone, C: ArmController> Executor<'_, F, C> {
         let has_torque = self.arm.simulation_mut().plant().has_torque(joint);
         let action = match to {
             HandAction::Degrees(degrees) => Action::Hand(joint, counts(joint, degrees)?),
-            HandAction::Grip(Grip::LetGo) => Action::LetGo(joint),
-            HandAction::Grip(Grip::Hold) if has_torque => {
+            HandAction::Grip(HandGrip::LetGo) => Action::LetGo(joint),
+            HandAction::Grip(HandGrip::Hold) if has_torque => {
                 return Err(ControlRefusal::new(
                     "the joint has torque, which is stronger than a hand",
                     "switch the motors off (motor state 2), or use the fault JOINT=stuck",
                 ));
             }
-            HandAction::Grip(Grip::Hold) => Action::Hold(joint),
+            HandAction::Grip(HandGrip::Hold) => Action::Hold(joint),
         };
         self.act(action);
         let angle = self.arm.simulation_mut().plant().angle(joint);
         Ok(json!({ "has_torque": has_torque, "angle_degrees": f64::from(angle) / 1_000.0 }))
     }
 
-    fn trip(&mut self, joint: u8, alarm: Alarm) -> Result<Value, ControlRefusal> {
+    fn trip(&mut self, joint: u8, alarm: ForcedAlarm) -> Result<Value, ControlRefusal> {
         let joint = joint_of(joint)?;
         let trip = match alarm {
-            Alarm::Overload if !self.arm.simulation_mut().plant().has_torque(joint) => {
+            ForcedAlarm::Overload if !self.arm.simulation_mut().plant().has_torque(joint) => {
                 return Err(ControlRefusal::new(
                     "the joint has no torque, so its servo cannot be overloaded",
                     "switch the motors on first (motor state 1), or use the alarm heat",
                 ));
             }
-            Alarm::Overload => Trip::Overload,
-            Alarm::Heat => Trip::Heat,
+            ForcedAlarm::Overload => Trip::Overload,
+            ForcedAlarm::Heat => Trip::Heat,
         };
         self.act(Action::Trip(joint, trip));
         Ok(json!({}))

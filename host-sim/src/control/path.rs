@@ -1,7 +1,7 @@
 //! Where the control sockets are: by default in `$XDG_RUNTIME_DIR/7bot`, or else in the state directory.
 //!
-//! `sevenbot sim` searches the same directories. The name of a socket contains the process id, so that each simulator has its
-//! own.
+//! `sevenbot sim` searches the same directories. The default name of a socket contains the process id, so that each simulator
+//! has its own.
 
 use std::fs::{self, DirBuilder};
 use std::io;

@@ -51,7 +51,7 @@ pub enum ControlRequest {
         joint: u8,
         /// The alarm; by default an overload.
         #[serde(default)]
-        alarm: Alarm,
+        alarm: ForcedAlarm,
     },
     /// Switches the power of the arm.
     Power {
@@ -93,7 +93,7 @@ pub enum ControlRequest {
 /// An alarm that is forced on a servo.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Alarm {
+pub enum ForcedAlarm {
     /// The servo latches an overload: the joint is free until its torque is switched off and on.
     #[default]
     Overload,
@@ -105,10 +105,10 @@ pub enum Alarm {
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(untagged, expecting = "the hand takes an angle in degrees, \"hold\" or \"let-go\"")]
 pub enum HandAction {
-    /// Turns the joint to this angle in degrees, and holds it there.
+    /// Turns the joint to this angle in degrees, and holds it there. A joint with torque turns back.
     Degrees(f64),
     /// Holds the joint where it is, or lets it go.
-    Grip(Grip),
+    Grip(HandGrip),
 }
 
 /// The speed of virtual time.
@@ -132,7 +132,7 @@ pub enum MaxSpeed {
 /// Whether a hand holds a joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Grip {
+pub enum HandGrip {
     /// A hand holds the joint until the joint has torque.
     Hold,
     /// No hand holds the joint. Without torque, a loaded joint falls.
@@ -206,7 +206,7 @@ mod tests {
             ),
             (
                 r#"{"do":"hand","joint":2,"to":"let-go"}"#,
-                ControlRequest::Hand { joint: 2, to: HandAction::Grip(Grip::LetGo) },
+                ControlRequest::Hand { joint: 2, to: HandAction::Grip(HandGrip::LetGo) },
             ),
             (r#"{"do":"advance","ms":250}"#, ControlRequest::Advance { ms: 250 }),
             (r#"{"do":"speed","factor":50}"#, ControlRequest::Speed { factor: SpeedFactor::Times(50.0) }),

@@ -67,7 +67,8 @@ impl JointState {
         registers.set(TARGET_POSITION.of(self.joint), target.nearest_degree());
     }
 
-    /// Holds at the set-point, which becomes the target. A joint without a set-point keeps its target.
+    /// Holds at the set-point, which becomes the target. The register of a joint without a set-point stays, but the joint will
+    /// hold where it engages.
     pub(crate) fn hold(&mut self, registers: &mut RegisterFile) {
         self.drive.hold();
         if self.drive.has_set_point() {

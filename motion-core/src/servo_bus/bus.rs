@@ -15,7 +15,7 @@ use crate::CYCLE;
 const MAX_NOISE_DELAY: Duration = Duration::from_millis(1);
 /// The number of registers of a goal: position, time and speed have two each.
 const GOAL_REGISTERS: usize = 6;
-/// How many different read lengths there are.
+/// In how many lengths each question is asked, so that its answer is not taken for one to an earlier question.
 const READ_LENGTHS: u8 = 4;
 
 /// The content of a valid answer of a servo.
@@ -86,7 +86,7 @@ impl Question {
 /// The outcome of a read from a servo.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// The servo sent a valid answer in time.
+    /// The servo sent a valid answer, and it came before the timeout was noticed.
     Measured {
         /// The joint whose servo was asked.
         joint: Joint,

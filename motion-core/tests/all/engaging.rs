@@ -54,7 +54,7 @@ fn d13_an_answer_that_has_come_is_where_the_servo_state_is_entered() {
     // The answer and the write come in this turn.
     rig.now_us = answered_at;
     rig.write(29, &[1]);
-    assert_eq!((rig.targets()[0], rig.present()[0]), (93, 93), "12 counts are 3.5 degrees");
+    assert_eq!((rig.targets()[0], rig.present()[0]), (93, 93), "12 counts are 2.5 degrees");
 }
 
 /// Each joint's goal at the moment when it was first given torque.

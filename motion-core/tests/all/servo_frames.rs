@@ -256,7 +256,7 @@ proptest! {
 }
 
 /// Two frames with damage at two places. A frame that damage splits is lost. So is a frame between the two places, unless the
-/// decoder was pulled before the second damage.
+/// first place is the start, or the decoder was pulled before the second damage.
 #[test]
 fn no_frame_continues_across_damage() {
     let stream = [encoded(|buffer| ping(buffer, 1)), encoded(|buffer| ping(buffer, 2))].concat();

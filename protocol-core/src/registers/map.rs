@@ -1,7 +1,7 @@
 //! THE TABLE: every register of map 2.2 of the 7Bot V2 (docs/protocol.md).
 //!
-//! Outside tests, benchmarks and texts for users, only this table and the table of map 2.1 hold the arm's register addresses
-//! as numbers. The registers of a server are in `host-link/src/sharing.rs`.
+//! In the Rust code, outside tests, benchmarks and texts for users, only this table and the table of map 2.1 hold the arm's
+//! register addresses as numbers. The registers of a server are in `host-link/src/sharing.rs`.
 
 use super::range::Range;
 use super::spec::{Register, eeprom, ram, rom, well_formed};

@@ -1,5 +1,6 @@
-//! The rules for writes, generated from both tables at compile time. The firmware image holds two bytes per register
-//! and map, eight more per value that those two bytes cannot check, and none of the tables' text.
+//! The rules for writes, generated from both tables at compile time. The firmware image holds two bytes per
+//! address up to the last writable one of each map, eight more per value that those two bytes cannot check, and the
+//! defaults. It holds none of the tables' text.
 
 use super::map::{MAP, PRESENT_POSITION, refusal};
 use super::map21::MAP_21;

@@ -13,7 +13,7 @@ pub enum Region {
     Rom,
     /// Survives power cuts; can be written only while the EEPROM lock is open.
     Eeprom,
-    /// Has its default after every power-up.
+    /// Has its default after every power-up, until the arm or a host sets it.
     Ram,
 }
 
@@ -24,12 +24,12 @@ pub enum Access {
     ReadOnly,
     /// Can be read and written, in EEPROM only while its lock is open.
     ReadWrite,
-    /// Reserved by the maker: a write in this map has no effect. Reads 0, unless the other map writes the register.
+    /// Reserved by the maker, or not used: a write in this map has no effect. Reads 0, unless the other map writes the register.
     Reserved,
 }
 
-/// One row of the table: a register, or a run of registers that mean the same (one per joint, or the bytes of one
-/// longer value). The range tells whether a value has one byte or two, the low byte first
+/// One row of the table: a register, or a run of registers that belong together (for example one per joint, or the
+/// bytes of one longer value). The range tells whether a value has one byte or two, the low byte first
 /// ([D22](crate::decisions#d22)).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Register {
@@ -47,7 +47,7 @@ pub struct Register {
     pub region: Region,
     /// Whether a write by a host has an effect.
     pub access: Access,
-    /// The valid values, also of defaults, and the width of a value.
+    /// The valid values, which include the defaults, and the width of a value.
     pub range: Range,
     /// The raw values after power-up or, in EEPROM, of a new arm. A per-joint row has one for each joint.
     pub defaults: [u16; JOINTS],

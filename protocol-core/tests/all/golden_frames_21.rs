@@ -1,6 +1,6 @@
 //! Frames of map 2.1 as the maker's own clients send and expect them, byte by byte. Add to them; never edit one.
 
-use protocol_core::request::{Alarm, Reply, Report, Request};
+use protocol_core::request::{Alarm, Reply, ReportMap21, Request};
 use protocol_core::time::{Duration, Instant};
 use protocol_core::wire::{Deframer, Direction, FrameBuffer, ToArm, ToHost};
 
@@ -155,10 +155,10 @@ fn m01_what_the_arm_sends_is_as_the_makers_clients_expect_it() {
         assert_eq!(sent, bytes, "{what}");
     }
     for &(what, address, values, bytes) in REPORTS {
-        let report = Report { address, values };
+        let report = ReportMap21 { address, values };
         let sent = both_ways::<ToHost>(
             |buffer| report.encode(buffer),
-            |deframer| assert_eq!(Report::from_frame(deframer.pull().unwrap().unwrap()), Some(report)),
+            |deframer| assert_eq!(ReportMap21::from_frame(deframer.pull().unwrap().unwrap()), Some(report)),
         );
         assert_eq!(sent, bytes, "{what}");
     }
@@ -198,7 +198,7 @@ fn a_reply_is_neither_a_report_nor_an_alarm() {
         |buffer| reply.encode(buffer),
         |deframer| {
             let frame = deframer.pull().unwrap().unwrap();
-            assert_eq!((Report::from_frame(frame), Alarm::from_frame(frame)), (None, None));
+            assert_eq!((ReportMap21::from_frame(frame), Alarm::from_frame(frame)), (None, None));
         },
     );
 }

@@ -215,7 +215,7 @@ fn noise_in_the_spare_leaves_the_settings() {
 }
 
 /// A word whose programming is cut at its very beginning may leave no trace. If the cut disturbed bits that were to stay
-/// ones, a record in this slot would not last. So the slot is not used again.
+/// ones, a record in this slot would not last. So the slot is not used again, unless its record was the first of a power cycle.
 #[test]
 fn a_slot_that_was_begun_without_a_trace_is_skipped() {
     let mut cases = 0;

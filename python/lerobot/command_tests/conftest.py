@@ -43,7 +43,7 @@ class Log:
         return cls(table[:, 0], table[:, 1:8], table[:, 8:15], table[:, 15:22])
 
     def loop_times(self) -> str:
-        """The durations of the turns of the loop, as text. The first turn is left out, because it has the approach."""
+        """The durations of the turns of the loop, as text. The first turn is left out: it does not wait after the approach."""
         turns = np.diff(self.times[1:]) * 1000
         late = int((turns > 40).sum())
         return (

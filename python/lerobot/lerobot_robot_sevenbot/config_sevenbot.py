@@ -31,7 +31,7 @@ class SevenbotConfig(RobotConfig):
     loads: bool = False
     # The largest change of a joint from one action to the next, in degrees. None: no limit but the arm's speed.
     max_step: float | None = None
-    # The speed of the fastest joint on the way to the first action, in degrees per second.
+    # The mean speed of the fastest joint on the way to the first action, in degrees per second.
     approach_speed: float = 30.0
     # The arm holds if no action and no read comes for this time, in seconds.
     watchdog: float = 0.5

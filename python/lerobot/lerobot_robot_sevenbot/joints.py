@@ -16,7 +16,7 @@ LOWEST, HIGHEST = ([float(angle) for angle in angles] for angles in sevenbot.lim
 CLAW_OPEN = HIGHEST[6]
 """The angle of the open claw in degrees; at 0 it is closed."""
 LEVEL = 65.0
-"""The forearm is parallel to the rear arm's crank at this sum of joints 2 and 3."""
+"""The forearm is parallel to the rear arm at this sum of joints 2 and 3."""
 LINKAGE = (19.0, 161.0)
 """The linkage keeps joint 2 + joint 3 - 65 between these angles."""
 

@@ -25,7 +25,7 @@ class SevenbotLeader(Device, Teleoperator):
     """A 7Bot V2 arm, real or simulated, whose measured positions are actions.
 
     The actions have the keys and scales of the robot `sevenbot`, and are within its limits. So a dataset has the actions that
-    the follower carries out.
+    the follower can carry out.
     """
 
     config_class = SevenbotLeaderConfig

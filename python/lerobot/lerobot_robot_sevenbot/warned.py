@@ -21,7 +21,6 @@ class Warned:
     """Which problems and changes of actions were told already."""
 
     def __init__(self) -> None:
-        """Nothing was told."""
         # When each problem began, and when it was last seen.
         self._problems: dict[str, tuple[float, float]] = {}
         self._told: set[str] = set()

@@ -12,17 +12,17 @@ use sevenbot::moves::{GuardedMoveError, MoveError, Pace, TipMove};
 use super::Arm;
 use crate::arguments::LinePace;
 use crate::errors::{InvalidType, InvalidValue, file_error, raised, warn_of};
-use crate::motion::{self, PlayOptions, RecordOptions, Recorded, TipWish};
-use crate::numbers::Angles;
-use crate::opening::Opened;
+use crate::motion::{self, PlayOptions, RecordOptions, RecordedText, TipRequest};
+use crate::numbers::PoseDegrees;
+use crate::opening::ArmFacts;
 use crate::recording::Recording;
 use crate::simulation::Simulation;
 use crate::watch::Watch;
 use crate::worker::{Worker, lock};
 
 impl Arm {
-    pub(super) fn of(worker: Worker, opened: Opened, simulation: Option<Simulation>) -> Self {
-        Self { worker: Arc::new(worker), simulation, sent: Mutex::new(None), opened }
+    pub(super) fn of(worker: Worker, facts: ArmFacts, simulation: Option<Simulation>) -> Self {
+        Self { worker: Arc::new(worker), simulation, sent: Mutex::new(None), facts }
     }
 
     /// Starts a move. If `wait`, waits for its end and returns the measured angles; otherwise returns `None`.
@@ -32,7 +32,7 @@ impl Arm {
         targets: FineTargets,
         pace: Pace,
         wait: bool,
-    ) -> PyResult<Option<Angles>> {
+    ) -> PyResult<Option<PoseDegrees>> {
         let sent = self.worker.call(py, move |arm, watch| match watch.is_stopped() {
             true => Err(MoveError::Interrupted),
             false => motion::begin(arm, targets, pace),
@@ -45,14 +45,14 @@ impl Arm {
     pub(super) fn go_to_tip(
         &self,
         py: Python<'_>,
-        wish: TipWish,
+        request: TipRequest,
         target: TipTarget,
         pace: Pace,
         wait: bool,
-    ) -> PyResult<Option<Angles>> {
+    ) -> PyResult<Option<PoseDegrees>> {
         let planned = self.worker.call(py, move |arm, _| -> Result<FineTargets, GuardedMoveError> {
-            let targets = TipMove::of(arm, &target, wish.tip, wish.tool)?.targets;
-            wish.guard.map_or(Ok(()), |guard| arm.check_way(&targets, pace, &guard))?;
+            let targets = TipMove::of(arm, &target, request.tip, request.tool)?.targets;
+            request.guard.map_or(Ok(()), |guard| arm.check_way(&targets, pace, &guard))?;
             Ok(targets)
         })?;
         let targets = raised(py, planned)?;
@@ -78,16 +78,16 @@ impl Arm {
     pub(super) fn move_straight(
         &self,
         py: Python<'_>,
-        wish: TipWish,
+        request: TipRequest,
         pace: LinePace,
         wait: bool,
-    ) -> PyResult<Angles> {
+    ) -> PyResult<PoseDegrees> {
         if !wait {
             let message = "straight=True needs wait=True: this program leads the tip until it is there";
             return Err(InvalidType::raise(py, message));
         }
-        raised(py, TipTarget::guarded(wish.tip, wish.tool, wish.guard.as_ref()))?;
-        let line = self.worker.call(py, move |arm, _| motion::straight_line(arm, wish, pace))?;
+        raised(py, TipTarget::guarded(request.tip, request.tool, request.guard.as_ref()))?;
+        let line = self.worker.call(py, move |arm, _| motion::straight_line(arm, request, pace))?;
         // The line begins at the targets of the arm.
         let options = PlayOptions { factor: 1.0, times: 1, approach: ApproachRule::Slowly };
         self.play_moments(py, raised(py, line)?, options)?;
@@ -95,7 +95,12 @@ impl Arm {
     }
 
     /// Parks the arm. With `keep`, also saves `pose` as the park pose of this arm.
-    pub(super) fn park_at(&self, py: Python<'_>, pose: Option<FineTargets>, keep: bool) -> PyResult<Angles> {
+    pub(super) fn park_at(
+        &self,
+        py: Python<'_>,
+        pose: Option<FineTargets>,
+        keep: bool,
+    ) -> PyResult<PoseDegrees> {
         let parked = self.worker.call(py, move |arm, watch| motion::park(arm, pose, keep, watch))?;
         let path = sevenbot::park_poses::path().unwrap_or_else(|| "park-poses".into());
         Ok(raised(py, parked)?.map_err(|why| file_error(py, &path, &why))?.into())
@@ -105,7 +110,7 @@ impl Arm {
     /// recorded before it in its attribute `recording`.
     pub(super) fn record_moments(&self, py: Python<'_>, options: RecordOptions) -> PyResult<Recording> {
         let work = move |arm: &mut sevenbot::Arm, watch: &mut Watch<'_>| motion::record(arm, options, watch);
-        let ((Recorded { text, arrivals }, outcome), signal) = self.worker.call_until_signal(py, work)?;
+        let ((RecordedText { text, arrivals }, outcome), signal) = self.worker.call_until_signal(py, work)?;
         let ends_it =
             |signal: &PyErr| options.limit.is_none() && signal.is_instance_of::<PyKeyboardInterrupt>(py);
         let failure = signal.filter(|signal| !ends_it(signal)).or(raised(py, outcome).err());

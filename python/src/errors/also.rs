@@ -10,14 +10,14 @@ use pyo3::types::{PyDict, PyTuple, PyType};
 
 use super::{Closed, Error};
 
-type Class = PyOnceLock<Py<PyType>>;
+type ExceptionClass = PyOnceLock<Py<PyType>>;
 
 macro_rules! also {
     ($($name:ident($other:ty) = $class:ident: $doc:literal;)*) => {
         $(
             #[doc = $doc]
             pub(crate) struct $name;
-            static $class: Class = Class::new();
+            static $class: ExceptionClass = ExceptionClass::new();
 
             impl $name {
                 pub(crate) fn class(py: Python<'_>) -> PyResult<Bound<'_, PyType>> {
@@ -125,7 +125,7 @@ pub(crate) fn file_error(py: Python<'_>, path: &std::path::Path, why: &io::Error
 
 /// Turns `Closed` into an error that is an `AttributeError` too, so that `hasattr` is false for attributes of a closed arm.
 pub(crate) fn without_attribute(py: Python<'_>, error: PyErr) -> PyErr {
-    static CLASS: Class = Class::new();
+    static CLASS: ExceptionClass = ExceptionClass::new();
     if !error.is_instance_of::<Closed>(py) {
         return error;
     }

@@ -83,7 +83,7 @@ class Robot:
                 return pose
 
     def move(self, pose: dict[str, float]) -> None:
-        """Puts the links where they are in a pose."""
+        """Places the links for a pose, in radians."""
         frames = {"base_link": np.eye(4)}
         waiting = list(self.joints)
         while waiting:

@@ -20,7 +20,7 @@ SIGNAL_PERIOD = 0.1
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Runs the node until a signal ends it. Returns the exit status of the program."""
+    """Runs the node until a signal comes or the thread of the arm ends. Returns the exit status of the program."""
     signals = EndSignals()
     rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
     try:

@@ -95,7 +95,7 @@ class Driver:
         try:
             self._open_and_serve()
         finally:
-            # Without this thread the node would be silent.
+            # Without this thread the node would publish nothing, so it ends.
             self.has_failed = not self._closing.is_set()
             self._events.ended()
 

@@ -24,7 +24,7 @@ class Measurement:
 
 
 class Events(Protocol):
-    """Receives what happens to the arm. All calls come from the thread of the arm."""
+    """Receives what happens to the arm. The driver makes its calls from the thread of the arm."""
 
     def measured(self, measurement: Measurement) -> None:
         """The joints were measured."""

@@ -95,7 +95,7 @@ class Streamer:
             self._next_point = clock.now() + self._settings.period
 
     def _steps(self) -> int:
-        """How many periods after the last point the next one is."""
+        """How many periods the lead goes on for the next point: as many as there were between the last two, and 0 for the first."""
         return 0 if self._last_number is None else self._skipped
 
     def _give_up(self, lead: Lead, error: sevenbot.Error) -> None:

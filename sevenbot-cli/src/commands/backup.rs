@@ -123,7 +123,7 @@ fn changed_registers(changes: &[Change], wanted: &Snapshot) -> Snapshot {
 
 /// Writes all changes in one frame: after a power cut this project's firmware has all of them or none (D19).
 fn write(arm: &mut Arm, wanted: &Snapshot) -> Result<(), CommandError> {
-    // New offsets move the arm a little, so Ctrl-C has to make it hold.
+    // New offsets may move the arm a little, so Ctrl-C has to make it hold.
     let write = |arm: &mut Arm| arm.write_checked(wanted.address, &wanted.values);
     hold_on_interrupt(arm, |arm, _| Ok(arm.with_open_lock(write)?))
 }

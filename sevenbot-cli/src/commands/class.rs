@@ -114,7 +114,7 @@ fn check_encryption(args: &ClassArgs) -> Result<(), CommandError> {
     Err(CommandError::Usage(reason.to_owned()))
 }
 
-/// The parts of the pupils' and the teacher's addresses.
+/// What the pupils and the teacher need to open their pages.
 struct Pages {
     hosts: Vec<IpAddr>,
     code: Option<String>,

@@ -160,7 +160,7 @@ impl PoseArg {
         let Self::By(step) = self else {
             return Ok(if let Self::At(angle) = self { Some(angle) } else { None });
         };
-        // Fails if the present target of the joint is unknown.
+        // Fails if the joint does not answer, or may still have its target of power-up.
         step_target(joints, joint, 0)?;
         let hundredths = i32::from(base.hundredths()).saturating_add(step);
         let angle = u16::try_from(hundredths).ok().and_then(FineAngle::from_hundredths);

@@ -56,8 +56,8 @@ pub(crate) struct RecoverArgs {
 /// Time limit until servos answer after their supply was switched on.
 const ANSWER_TIMEOUT: Duration = Duration::from_secs(3);
 const RECOVERY_TIMEOUT: Duration = Duration::from_secs(6);
-/// The arm has recovered after this time without a problem. It is longer than the second after which a joint counts as blocked
-/// (D27).
+/// Step 4 ends after this time without a problem for which [`needs_motors`] is true. It is longer than the second after which a
+/// joint counts as blocked (D27).
 const QUIET_TIME: Duration = Duration::from_secs(2);
 const POLL_PERIOD: Duration = Duration::from_millis(100);
 /// How long the motors are off to end an overload (forceless, then servo).

@@ -16,12 +16,12 @@ Examples:
   sevenbot registers --format python > sevenbot_registers.py")]
 pub(crate) struct RegistersArgs {
     /// Format of the output.
-    #[arg(long, value_enum, default_value_t = Format::Text)]
-    format: Format,
+    #[arg(long, value_enum, default_value_t = TableFormat::Text)]
+    format: TableFormat,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
-enum Format {
+enum TableFormat {
     /// Columns of text.
     Text,
     /// Markdown, as docs/registers.md.
@@ -35,13 +35,13 @@ enum Format {
 }
 
 pub(crate) fn run(session: &mut Session, args: &RegistersArgs) -> Result<(), CommandError> {
-    let format = if session.printer.is_json() { Format::Json } else { args.format };
+    let format = if session.printer.is_json() { TableFormat::Json } else { args.format };
     let text = match format {
-        Format::Text => text(),
-        Format::Markdown => table::markdown(),
-        Format::Json => json(),
-        Format::C => table::c_header(),
-        Format::Python => table::python(),
+        TableFormat::Text => text(),
+        TableFormat::Markdown => table::markdown(),
+        TableFormat::Json => json(),
+        TableFormat::C => table::c_header(),
+        TableFormat::Python => table::python(),
     };
     session.printer.print_raw(text.as_bytes())
 }

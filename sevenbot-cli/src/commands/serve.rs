@@ -14,7 +14,7 @@ use sevenbot::simulated::simulated_port;
 use sevenbot::{OpenError, ports};
 use sevenbot_serve::hub::{HoldOutcome, HubOptions};
 use sevenbot_serve::server::{
-    AccessPolicy, ArmLocation, Notice, RefusalReason, Server, ServerConfig, StartError, Stop, TlsFiles,
+    AccessPolicy, ArmLocation, Notice, RefusalReason, Server, ServerConfig, ServerStop, StartError, TlsFiles,
 };
 
 use crate::advice::START_SIMULATOR;
@@ -114,7 +114,7 @@ pub(crate) struct ServeArgs {
     read_only: bool,
 }
 
-/// Each system accepts a path of a Unix socket with up to this many bytes.
+/// Linux and macOS accept a path of a Unix socket with up to this many bytes.
 const LONGEST_PATH: usize = 100;
 
 /// An address or a link at which programs can connect.
@@ -149,8 +149,8 @@ pub(super) fn open_server(
     config: ServerConfig,
     local: Option<&LocalServer>,
     open: impl FnOnce(ServerConfig) -> Result<Server, StartError>,
-) -> Result<(Server, Stop), CommandError> {
-    // Catch Ctrl-C before the links are created, so that they are removed in any case.
+) -> Result<(Server, ServerStop), CommandError> {
+    // Catch Ctrl-C before the links are created, so that it does not leave them behind.
     let stop = stop_signal()?;
     let config = ServerConfig { socket: local.map(|local| local.socket.clone()), ..config };
     let server = open(config).map_err(|error| CommandError::Arm(error.to_string()))?;
@@ -160,7 +160,7 @@ pub(super) fn open_server(
 /// Serves until it is stopped. Other programs of this user find the server by `local`.
 pub(super) fn run_server(
     server: Server,
-    stop: &Stop,
+    stop: &ServerStop,
     local: Option<&LocalServer>,
 ) -> Result<(), CommandError> {
     let mut registered = None;
@@ -187,7 +187,7 @@ pub(super) fn default_local(name: Option<String>) -> Option<LocalServer> {
     LocalServer::of_this_process(name).filter(|local| local.socket.as_os_str().len() <= LONGEST_PATH)
 }
 
-/// Announces the name to the local network, if other computers can connect.
+/// Announces the name to the local network, if other computers can connect over TCP.
 fn announce_name(args: &ServeArgs, server: &Server) -> Option<Announcement> {
     let (name, address) =
         args.name.as_ref().zip(server.tcp_address().filter(|address| !address.ip().is_loopback()))?;
@@ -286,8 +286,8 @@ pub(super) fn check_not_busy(arm: &ArmLocation, baud: u32) -> Result<(), Command
 }
 
 /// Ends the server at Ctrl-C, and at signals that ask a program to end.
-fn stop_signal() -> Result<Stop, CommandError> {
-    let stop = Stop::default();
+fn stop_signal() -> Result<ServerStop, CommandError> {
+    let stop = ServerStop::default();
     let trigger = stop.clone();
     ctrlc::set_handler(move || trigger.stop())
         .map_err(|error| CommandError::Arm(format!("cannot catch Ctrl-C: {error}")))?;

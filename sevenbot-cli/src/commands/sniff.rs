@@ -122,7 +122,7 @@ fn port(session: &mut Session) -> Result<(), CommandError> {
 
 #[derive(Serialize)]
 struct TrafficLine {
-    /// Since the start of the capture or of the log; `None` for a file of raw bytes, which has no times.
+    /// Since the start of the capture or of the log; `None` for raw bytes, which have no times.
     seconds: Option<f64>,
     kind: &'static str,
     address: Option<u8>,

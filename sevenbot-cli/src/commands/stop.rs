@@ -73,13 +73,13 @@ impl Printable for Stopped {
 }
 
 /// The result of stopping an arm, and the port of the arm.
-type Outcome = (Result<JointSnapshot, CommandError>, String);
+type StopResult = (Result<JointSnapshot, CommandError>, String);
 
 /// Stops all arms at the same time. An arm whose port a server holds is stopped through the server.
 fn stop_all(session: &mut Session) -> Result<(), CommandError> {
     let served: Vec<_> = network::servers().iter().map(network::LocalServer::address).collect();
     let simulators = running_simulators();
-    // Any other port may lead to another device: a failure to open it is only a warning, unless no arm was stopped.
+    // Any other port may lead to another device: a failure to open it is only a warning, unless no arm was found.
     let is_arm = |port: &String| served.iter().chain(&simulators).chain(&session.port).any(|arm| arm == port);
     let mut failed: Option<CommandError> = None;
     let (mut has_stopped, mut tried) = (false, Vec::new());
@@ -106,7 +106,7 @@ fn stop_all(session: &mut Session) -> Result<(), CommandError> {
 
 /// Stops each arm in a thread of its own, and waits for all threads. The caller prints afterwards, so that an output error
 /// cannot prevent a stop.
-fn stop_each(session: &Session, served: &[String], simulators: &[String]) -> Vec<Outcome> {
+fn stop_each(session: &Session, served: &[String], simulators: &[String]) -> Vec<StopResult> {
     let listed = ports::available().into_iter().map(|port| port.name);
     let free = |port: &String| network::serving(port).is_none();
     let free = listed.chain(simulators.iter().cloned()).chain(session.port.clone()).filter(free);

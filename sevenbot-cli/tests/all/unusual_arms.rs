@@ -128,7 +128,7 @@ fn a_second_ctrl_c_ends_the_program_at_once() {
         .spawn()
         .unwrap();
     is_moving.recv_timeout(TIMEOUT).unwrap();
-    // After the first Ctrl-C alone the program would end with status 3, after three more timeouts. Two signals may
+    // After the first Ctrl-C alone the program would end with another status, after several more timeouts. Two signals may
     // merge into one, so repeat.
     let id = waiting.id().to_string();
     while waiting.try_wait().unwrap().is_none() {

@@ -1,7 +1,7 @@
 //! Queues or drops each request of a client. A stop also drops the motion that waits, and ends the streams of the other
 //! clients.
 
-use host_link::sharing::Command;
+use host_link::sharing::SharingCommand;
 use protocol_core::time::Instant;
 
 use super::Hub;
@@ -33,7 +33,7 @@ pub enum Admission {
 
 impl Hub {
     /// Takes a request of a client, which was sent at `since` or later. A stop is carried out with the next [`Hub::poll`],
-    /// before everything else.
+    /// before everything else; of a flood of stops only the first ones are.
     pub fn request(
         &mut self,
         now: Instant,
@@ -78,7 +78,7 @@ impl Hub {
         if self.options.is_read_only {
             return Admission::ReadOnly;
         }
-        self.obey(now, id, Command::Stop);
+        self.obey(now, id, SharingCommand::Stop);
         Admission::Queued
     }
 
@@ -97,7 +97,7 @@ impl Hub {
         id: ClientId,
         request: WholeRequest,
         intent: Option<Intent>,
-        command: Option<Command>,
+        command: Option<SharingCommand>,
     ) -> Admission {
         let may_hear = self.is_silent() && !self.options.is_read_only;
         match intent.filter(|_| may_hear) {
@@ -106,15 +106,16 @@ impl Hub {
                 self.queue(now, id, Waiting { request, intent, since: now });
                 return Admission::Queued;
             }
-            Some(Intent::Stop | Intent::Hold) => self.obey(now, id, Command::Stop),
-            Some(_) if command == Some(Command::Stop) => self.obey(now, id, Command::Stop),
+            Some(Intent::Stop | Intent::Hold) => self.obey(now, id, SharingCommand::Stop),
+            Some(_) if command == Some(SharingCommand::Stop) => self.obey(now, id, SharingCommand::Stop),
             _ => {}
         }
         self.answer_without_arm(now, id, &request);
         Admission::NoArm
     }
 
-    /// Answers a request while there is no arm: a read of the server's own registers gets a reply, all others are refused.
+    /// Answers a request while there is no arm: a read of the server's own registers gets a reply if the client has room for it,
+    /// all others are refused.
     fn answer_without_arm(&mut self, now: Instant, id: ClientId, request: &WholeRequest) {
         let reply = self.own_reply(now, id, request);
         let Some(client) = self.clients.get_mut(&id) else { return };
@@ -129,7 +130,7 @@ impl Hub {
     /// itself.
     fn refuse_late(&mut self, now: Instant, id: ClientId, intent: Intent) -> Admission {
         if intent.is_urgent() {
-            self.obey(now, id, Command::Stop);
+            self.obey(now, id, SharingCommand::Stop);
             return Admission::Queued;
         }
         if let Some(client) = self.clients.get_mut(&id) {
@@ -179,18 +180,18 @@ impl Hub {
     }
 
     /// Carries out a command in register 239.
-    fn obey(&mut self, now: Instant, id: ClientId, command: Command) {
+    fn obey(&mut self, now: Instant, id: ClientId, command: SharingCommand) {
         match command {
-            Command::Stop => {
+            SharingCommand::Stop => {
                 self.stop(now, id);
                 self.start_hold();
             }
-            Command::StartAnew => {
+            SharingCommand::StartAnew => {
                 if let Some(client) = self.clients.get_mut(&id) {
                     client.driving.start_anew();
                 }
             }
-            Command::HandOver => self.driver.end(Some(id)),
+            SharingCommand::HandOver => self.driver.end(Some(id)),
         }
     }
 }

@@ -4,7 +4,7 @@ use protocol_core::registers::map::LIMITS;
 use protocol_core::registers::{JOINTS, Joint, Register};
 
 /// The angle of each joint in hundredths of a degree; `None` for a joint whose registers are not among the values.
-pub(crate) type Angles = [Option<u16>; JOINTS];
+pub(crate) type JointAngles = [Option<u16>; JOINTS];
 
 /// The value of a fine position that was not measured.
 pub(crate) const UNMEASURED: u16 = u16::MAX;
@@ -12,7 +12,7 @@ pub(crate) const UNMEASURED: u16 = u16::MAX;
 pub(crate) const DEGREE: u16 = 100;
 
 /// The angles of a row in the values from `address` on, as far as they are there, in hundredths of a degree.
-pub(crate) fn angles_in(row: &Register, address: u8, values: &[u8]) -> Angles {
+pub(crate) fn angles_in(row: &Register, address: u8, values: &[u8]) -> JointAngles {
     Joint::ALL.map(|joint| {
         let start = usize::from(row.of(joint).checked_sub(address)?);
         match *values.get(start..start + usize::from(row.range.width()))? {

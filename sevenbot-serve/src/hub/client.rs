@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use host_link::sharing::Command;
+use host_link::sharing::SharingCommand;
 use protocol_core::registers::Map;
 use protocol_core::report_kind::ReportKind;
 use protocol_core::time::{Duration, Instant};
@@ -22,17 +22,17 @@ pub(crate) const MOST_WAITING: usize = 20;
 pub const LONGEST_WAIT: Duration = Duration::from_millis(200);
 /// A report is dropped while this many events or more wait for the client.
 const MOST_REPORTS: usize = 4;
-/// Bytes that the waiting requests of a client and their replies may take on the line: 90 ms at 115 200 baud. One request is
-/// always allowed.
+/// A client has no room for another request while its waiting ones and their replies take this many bytes or more on the line:
+/// 90 ms at 115 200 baud.
 const MOST_WAITING_BYTES: usize = 1_024;
-/// A client may send this many urgent requests in each period. More wait like other requests, so that a flood delays no other
-/// client.
+/// A client may send this many urgent requests in each period. More wait like other requests, so that a flood does not keep
+/// the other clients from the line.
 const MOST_URGENT: u8 = 4;
 const URGENT_PERIOD: Duration = Duration::from_millis(100);
 
 /// An event of the hub for a client.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Event {
+pub enum HubEvent {
     /// The reply to the client's oldest read.
     Reply {
         /// The first register.
@@ -65,7 +65,7 @@ pub(crate) struct Waiting {
 }
 
 #[derive(Debug, Default)]
-pub(crate) struct Client {
+pub(crate) struct HubClient {
     pub(crate) waiting: VecDeque<Waiting>,
     /// Holds, stops, and writes that switch the motors off. They go before everything else.
     pub(crate) urgent: VecDeque<Waiting>,
@@ -77,7 +77,7 @@ pub(crate) struct Client {
     pub(crate) dropped: u16,
     /// When it closed its connection; `None` while it is connected.
     pub(crate) left: Option<Instant>,
-    pub(crate) events: VecDeque<Event>,
+    pub(crate) events: VecDeque<HubEvent>,
     pub(crate) own: OwnRegisters,
     pub(crate) schedule: Schedule,
     pub(crate) share: Share,
@@ -87,7 +87,7 @@ pub(crate) struct Client {
     pub(crate) can_receive: bool,
 }
 
-impl Client {
+impl HubClient {
     /// Can it make another request?
     pub(crate) fn has_room(&self) -> bool {
         let bytes: usize = self.waiting.iter().map(|waiting| waiting.request.line_bytes()).sum();
@@ -101,7 +101,7 @@ impl Client {
         now: Instant,
         request: &WholeRequest,
         known: &KnownRegisters,
-    ) -> (Option<Intent>, Option<Command>) {
+    ) -> (Option<Intent>, Option<SharingCommand>) {
         match request {
             WholeRequest::Read { .. } => (None, None),
             WholeRequest::Write { map, address, values } if !known.accepts(*map, *address, values) => {
@@ -109,7 +109,7 @@ impl Client {
             }
             WholeRequest::Write { map, address, values } => {
                 let intent = Intent::of(now, *map, *address, values, &self.readings);
-                let command = Command::in_write(*address, values).filter(|_| *map == Map::V22);
+                let command = SharingCommand::in_write(*address, values).filter(|_| *map == Map::V22);
                 (Some(intent), command)
             }
             WholeRequest::WritesBetweenReads { .. } => (Some(Intent::Motion), None),
@@ -150,14 +150,14 @@ impl Client {
         let is_due = self.schedule.take_due(now, stream) && self.events.len() < MOST_REPORTS;
         if is_due {
             self.readings.note(now, stream.registers().0, values);
-            self.events.push_back(Event::Report { stream, values: values.to_vec() });
+            self.events.push_back(HubEvent::Report { stream, values: values.to_vec() });
         }
         is_due
     }
 
     /// Its oldest read has ended.
-    pub(crate) fn end_read(&mut self, now: Instant, event: Event) {
-        if let Event::Reply { address, values } = &event {
+    pub(crate) fn end_read(&mut self, now: Instant, event: HubEvent) {
+        if let HubEvent::Reply { address, values } = &event {
             self.readings.note(now, *address, values);
         }
         self.unanswered = self.unanswered.saturating_sub(1);
@@ -207,7 +207,7 @@ impl Client {
         self.waiting.len() != before
     }
 
-    /// Counts a dropped write, or queues [`Event::NoReply`] for each read of a dropped request.
+    /// Counts a dropped write, or queues [`HubEvent::NoReply`] for each read of a dropped request.
     pub(crate) fn refuse(&mut self, request: &WholeRequest) {
         let (reads, (address, count)) = match request {
             WholeRequest::Read { address, count } => (1, (*address, *count)),
@@ -217,6 +217,6 @@ impl Client {
                 return;
             }
         };
-        self.events.extend((0..reads).map(|_| Event::NoReply { address, count }));
+        self.events.extend((0..reads).map(|_| HubEvent::NoReply { address, count }));
     }
 }

@@ -5,37 +5,37 @@ use protocol_core::registers::map::{FAULTS, fault};
 use protocol_core::time::Instant;
 
 use super::Hub;
-use super::client::{Client, Event};
+use super::client::{HubClient, HubEvent};
 use super::client_id::ClientId;
 use super::line::Owner;
 use super::own_registers::byte_at;
 use super::request::WholeRequest;
 
 impl Hub {
-    pub(super) fn deliver(&mut self, now: Instant, owner: Owner, event: Event) {
-        if matches!(event, Event::Reply { .. }) {
+    pub(super) fn deliver(&mut self, now: Instant, owner: Owner, event: HubEvent) {
+        if matches!(event, HubEvent::Reply { .. }) {
             self.presence.hear(now);
         }
         match (owner, event) {
             (Owner::Client(id), mut event) => {
-                if let Event::Reply { address, values } = &mut event {
+                if let HubEvent::Reply { address, values } = &mut event {
                     self.overlay(now, id, *address, values);
                 }
                 let Some(client) = self.clients.get_mut(&id) else { return };
                 client.end_read(now, event);
                 self.news.insert(id);
             }
-            (Owner::Sample(stream), Event::Reply { values, .. }) => {
+            (Owner::Sample(stream), HubEvent::Reply { values, .. }) => {
                 for (&id, client) in &mut self.clients {
                     if client.report(now, stream, &values) {
                         self.news.insert(id);
                     }
                 }
             }
-            (Owner::Hold, Event::Reply { address, values }) => self.continue_hold(now, address, &values),
-            (Owner::Speeds, Event::Reply { values, .. }) => self.note_speeds(&values),
-            (Owner::Identity, Event::Reply { values, .. }) => self.identify(now, &values),
-            (Owner::Presence, Event::NoReply { .. }) if self.has_arm() && self.presence.miss() => {
+            (Owner::Hold, HubEvent::Reply { address, values }) => self.continue_hold(now, address, &values),
+            (Owner::Speeds, HubEvent::Reply { values, .. }) => self.note_speeds(&values),
+            (Owner::Identity, HubEvent::Reply { values, .. }) => self.identify(now, &values),
+            (Owner::Presence, HubEvent::NoReply { .. }) if self.has_arm() && self.presence.miss() => {
                 self.lose_arm(now);
             }
             // A hold reads again by itself.
@@ -57,18 +57,18 @@ impl Hub {
     }
 
     /// The reply to a read of the server's registers and no others: it needs no arm.
-    pub(super) fn own_reply(&self, now: Instant, id: ClientId, request: &WholeRequest) -> Option<Event> {
+    pub(super) fn own_reply(&self, now: Instant, id: ClientId, request: &WholeRequest) -> Option<HubEvent> {
         let &WholeRequest::Read { address, count } = request else { return None };
         let client = self.clients.get(&id).filter(|client| client.can_receive)?;
         sharing::is_own(address, count).then(|| {
             let mut values = vec![0; count.into()];
             self.sharing_state(now, id, client).overlay(address, &mut values);
-            Event::Reply { address, values }
+            HubEvent::Reply { address, values }
         })
     }
 
     /// The values of the server's registers for a client.
-    fn sharing_state(&self, now: Instant, id: ClientId, client: &Client) -> SharingState {
+    fn sharing_state(&self, now: Instant, id: ClientId, client: &HubClient) -> SharingState {
         let clients = self.clients.values().filter(|client| client.left.is_none()).count();
         SharingState {
             clients: u8::try_from(clients).unwrap_or(u8::MAX),

@@ -59,7 +59,7 @@ pub(crate) enum MayNotMove {
 /// The client that drives the arm.
 #[derive(Debug, Default)]
 pub(crate) struct Driver {
-    /// The client that wrote a target last, and when.
+    /// The client that wrote a target last, and when. Targets that were dropped do not count.
     last: Option<(ClientId, Instant)>,
     /// Only one client drives at a time.
     is_exclusive: bool,

@@ -1,11 +1,11 @@
-//! The targets that stops and holds gave to joints, until a write moves or switches something.
+//! The targets that stops and holds gave to joints, until a write moves or switches something, or the arm is lost.
 //!
 //! A joint that was stopped brakes past its target and returns to it. Meanwhile the server must not hold it at its measured
 //! position: the arm would come to rest at another position than the confirmed one.
 
 use protocol_core::registers::Joint;
 
-use super::angles::Angles;
+use super::angles::JointAngles;
 use super::intent::Intent;
 
 /// The longest distance of a braking joint from the target that holds it, in hundredths of a degree. A joint that is farther
@@ -14,11 +14,11 @@ const LONGEST_BRAKING: u16 = 1_500;
 
 /// The targets that hold joints; `None`: no stop or hold gave the joint a target.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct HeldTargets(Angles);
+pub(crate) struct HeldTargets(JointAngles);
 
 impl HeldTargets {
     /// Notes a write to the arm, with this intent and these targets.
-    pub(crate) fn note_write(&mut self, intent: Intent, targets: &Angles) {
+    pub(crate) fn note_write(&mut self, intent: Intent, targets: &JointAngles) {
         match intent {
             Intent::Setting => {}
             Intent::Hold | Intent::Stop => {

@@ -15,7 +15,7 @@ use protocol_core::registers::{JOINTS, Map};
 use protocol_core::time::Instant;
 
 use super::Hub;
-use super::arm_hold::{ArmHold, Frame, Restoring, joined};
+use super::arm_hold::{ArmHold, RegisterWrite, Restoring, joined};
 use super::intent::Intent;
 use super::known_registers::KnownRegisters;
 use super::line::Owner;
@@ -140,7 +140,7 @@ impl Hub {
 
     /// Writes the targets that hold the arm. A set-point period would delay them, so it is 0 meanwhile. The maker's firmware
     /// has no period.
-    fn write_targets(&mut self, now: Instant, frames: &[Frame]) {
+    fn write_targets(&mut self, now: Instant, frames: &[RegisterWrite]) {
         let period = self.known.word(SET_POINT_PERIOD.address);
         let is_delayed = !frames.is_empty() && period != 0 && self.known.is_ours();
         if is_delayed {
@@ -156,7 +156,7 @@ impl Hub {
         }
     }
 
-    /// The arm holds: restores what the hold changed, until a reply confirms it.
+    /// The arm holds: restores what the hold changed, until a reply confirms it or it was tried often enough.
     fn restore(&mut self, now: Instant, mut hold: ArmHold, what: Restoring, address: u8, values: &[u8]) {
         let frames = match what {
             Restoring::Period => self.period_to_restore(values),
@@ -187,14 +187,14 @@ impl Hub {
     }
 
     /// The frame that restores the set-point period of the clients; none if the arm has this period.
-    fn period_to_restore(&self, found: &[u8]) -> Vec<Frame> {
+    fn period_to_restore(&self, found: &[u8]) -> Vec<RegisterWrite> {
         let wanted = self.known.word(SET_POINT_PERIOD.address).to_le_bytes();
         (found != wanted).then(|| (SET_POINT_PERIOD.address, wanted.to_vec())).into_iter().collect()
     }
 
     /// The frames that restore the speeds of the joints that still have the speed of the brake. A client may have written the
     /// other speeds since.
-    fn speeds_to_restore(&self, address: u8, values: &[u8]) -> Vec<Frame> {
+    fn speeds_to_restore(&self, address: u8, values: &[u8]) -> Vec<RegisterWrite> {
         let found = (address..=u8::MAX).zip(values).filter(|(register, _)| SPEED.holds(*register));
         let is_slow =
             found.filter(|&(register, speed)| *speed == BRAKE && self.known.byte(register) != BRAKE);

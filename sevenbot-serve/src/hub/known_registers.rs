@@ -12,7 +12,7 @@ use protocol_core::registers::map::{
 use protocol_core::registers::map21::{OPTIONS, option};
 use protocol_core::registers::{Accepted, Joint, Map, RegisterFile};
 
-use super::angles::Angles;
+use super::angles::JointAngles;
 
 /// The registers of the arm that the hub knows.
 #[derive(Debug)]
@@ -87,8 +87,8 @@ impl KnownRegisters {
     }
 
     /// The targets in a write that the arm accepts, in hundredths of a degree.
-    pub(crate) fn targets_in(&self, map: Map, address: u8, values: &[u8]) -> Angles {
-        let Some(accepted) = self.check(map, address, values) else { return Angles::default() };
+    pub(crate) fn targets_in(&self, map: Map, address: u8, values: &[u8]) -> JointAngles {
+        let Some(accepted) = self.check(map, address, values) else { return JointAngles::default() };
         Joint::ALL.map(|joint| {
             let degrees = accepted.value_at(TARGET_POSITION.of(joint));
             let fine = || accepted.word_at(FINE_TARGET.of(joint));

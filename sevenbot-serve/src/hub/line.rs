@@ -11,13 +11,14 @@ use protocol_core::registers::map::{FINE_POSITION, LOAD, PRESENT_POSITION};
 use protocol_core::report_kind::ReportKind;
 use protocol_core::time::{Duration, Instant};
 
-use super::client::{Client, Event};
+use super::client::{HubClient, HubEvent};
 use super::client_id::ClientId;
 use super::request::{WholeRequest, reply_bytes};
 
 /// For reads of clients. If a reply is later than recent delays explain, the read is repeated, unless something was written
-/// since. So a lost frame delays its client, and the clients that wait for the line, only a little. The read is given up after
-/// 3 s only, because a busy computer may not run the arm's side of the port for a second.
+/// since. So a lost frame delays its client, and the clients that wait for the line, only a little. The read is given up
+/// after 3 s, because a busy computer may not run the arm's side of the port for a second. It ends earlier if a later reply shows
+/// that its own one is lost, and it may not be repeated.
 const CLIENT_PATIENCE: Patience = Patience { attempts: 3, timeout: Duration::from_millis(1_000) };
 /// For reads of a hold. Until a reply comes, the hold itself sends another read every 100 ms, after the brake unless it restores.
 /// The reply to each read may be up to 1 s late.
@@ -26,11 +27,11 @@ const HOLD_PATIENCE: Patience = Patience { attempts: 10, timeout: Duration::from
 const OWN_PATIENCE: Patience = Patience { attempts: 1, timeout: Duration::from_millis(1_000) };
 /// The line may be filled this far ahead, so that it is not idle while the program wakes up.
 const AHEAD: Duration = Duration::from_millis(1);
-/// Bytes that may wait for the port.
+/// While this many bytes or more wait for the port, the line is not free.
 const MOST_OUTPUT: usize = 64;
 /// If this many bytes wait, the port counts as stuck. A hold that repeats its frames then adds no more.
 const STUCK_OUTPUT: usize = 1_024;
-/// Bytes of replies that may be on their way. One read is always allowed.
+/// Bytes of replies that may be on their way when a client's read is sent. One read is always allowed.
 const WINDOW: usize = 96;
 
 /// The ranges of the reports of map 2.2 ([D26](protocol_core::decisions#d26)).
@@ -70,13 +71,13 @@ pub(crate) struct Line {
     output: Vec<u8>,
     /// The owners of the pending reads. Clients may share a read.
     owners: BTreeMap<RequestId, Vec<Owner>>,
-    events: VecDeque<(Owner, Event)>,
+    events: VecDeque<(Owner, HubEvent)>,
 }
 
 impl Line {
     /// `may_report`: the arm may send reports that an earlier program asked for.
     pub(crate) fn new(baud: u32, may_report: bool) -> Self {
-        // Otherwise the hub switches reports off, and samples the arm itself.
+        // Otherwise the hub switches reports off when it finds the arm.
         let reports = if may_report { REPORTS } else { &[] };
         let link = HostLink::new(LinkOptions { baud, reports });
         Self { link, output: Vec::new(), owners: BTreeMap::new(), events: VecDeque::new() }
@@ -118,7 +119,7 @@ impl Line {
     }
 
     /// The next end of a read, and the owner of this read.
-    pub(crate) fn next_event(&mut self, now: Instant) -> Option<(Owner, Event)> {
+    pub(crate) fn next_event(&mut self, now: Instant) -> Option<(Owner, HubEvent)> {
         self.advance(now);
         self.events.pop_front()
     }
@@ -132,7 +133,9 @@ impl Line {
                     self.output.extend(frame);
                     continue;
                 }
-                HostEvent::Reply(id, Snapshot { address, values }) => (id, Event::Reply { address, values }),
+                HostEvent::Reply(id, Snapshot { address, values }) => {
+                    (id, HubEvent::Reply { address, values })
+                }
                 HostEvent::NoReply(id, range) => (id, no_reply(range.address(), range.count())),
                 _ => continue,
             };
@@ -169,7 +172,7 @@ impl Line {
     }
 
     /// Can the client's oldest request be sent?
-    pub(crate) fn takes(&self, client: &Client) -> bool {
+    pub(crate) fn takes(&self, client: &HubClient) -> bool {
         match client.waiting.front().map(|waiting| &waiting.request) {
             Some(WholeRequest::Read { count, .. }) => {
                 client.can_receive && client.unanswered == 0 && self.has_window(reply_bytes(*count))
@@ -233,6 +236,6 @@ impl Line {
     }
 }
 
-const fn no_reply(address: u8, count: u8) -> Event {
-    Event::NoReply { address, count }
+const fn no_reply(address: u8, count: u8) -> HubEvent {
+    HubEvent::NoReply { address, count }
 }

@@ -1,10 +1,10 @@
 //! The hub: whole requests of many clients in, frames to one arm out, and each reply back to its client.
 //!
 //! ```text
-//!   Client ─┐                      ┌─▶ Line ──▶ arm
-//!   Client ─┼─▶ Hub::poll: the ────┤
-//!   Sampler ┘   client that used   └─◀ Line ◀── arm
-//!               the line least
+//!   HubClient ─┐                      ┌─▶ Line ──▶ arm
+//!   HubClient ─┼─▶ Hub::poll: the ────┤
+//!   Sampler ───┘   client that used   └─◀ Line ◀── arm
+//!                  the line least
 //! ```
 //!
 //! * While a read of a client has no reply, the client's later requests wait, so their order is kept. Urgent ones do not wait.
@@ -17,8 +17,8 @@
 
 mod admission;
 mod angles;
+mod arm_connection;
 mod arm_hold;
-mod arm_state;
 mod client;
 mod client_id;
 mod delivery;
@@ -43,7 +43,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use protocol_core::time::Instant;
 
 use self::arm_hold::ArmHold;
-use self::client::Client;
+use self::client::HubClient;
 use self::drive::Driver;
 use self::held_targets::HeldTargets;
 use self::known_registers::KnownRegisters;
@@ -54,7 +54,7 @@ use self::shares::Shares;
 use self::watchdog::ClientWatchdog;
 
 pub use self::admission::Admission;
-pub use self::client::{Event, LONGEST_WAIT};
+pub use self::client::{HubEvent, LONGEST_WAIT};
 pub use self::client_id::ClientId;
 pub use self::holding::HoldOutcome;
 pub use self::request::WholeRequest;
@@ -70,7 +70,7 @@ pub struct HubOptions {
 
 /// The state of the port to the arm, and of the arm behind it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum ArmState {
+enum ArmConnection {
     /// The port is closed.
     Absent,
     /// The port is open. The next question is due at this time.
@@ -85,9 +85,9 @@ enum ArmState {
 /// The clients of one arm, and the line to it.
 #[derive(Debug)]
 pub struct Hub {
-    clients: BTreeMap<ClientId, Client>,
+    clients: BTreeMap<ClientId, HubClient>,
     next_id: ClientId,
-    arm: ArmState,
+    arm: ArmConnection,
     known: KnownRegisters,
     /// The chip id that the arm has to have; `None`: any.
     chip_id: Option<Vec<u8>>,
@@ -121,7 +121,7 @@ impl Hub {
         Self {
             clients: BTreeMap::new(),
             next_id: ClientId::default(),
-            arm: ArmState::Absent,
+            arm: ArmConnection::Absent,
             known: KnownRegisters::new(),
             chip_id: None,
             line: Line::new(baud, options.is_read_only),
@@ -146,7 +146,7 @@ impl Hub {
     pub fn connect(&mut self) -> ClientId {
         let id = self.next_id;
         self.next_id = id.next();
-        self.clients.insert(id, Client::default());
+        self.clients.insert(id, HubClient::default());
         id
     }
 
@@ -171,7 +171,7 @@ impl Hub {
     /// Can the client make another request?
     #[must_use]
     pub fn has_room(&self, id: ClientId) -> bool {
-        self.clients.get(&id).is_some_and(Client::has_room)
+        self.clients.get(&id).is_some_and(HubClient::has_room)
     }
 
     /// The clients that have something new since the last call: events, room for requests, or the outcome of a hold.
@@ -187,19 +187,19 @@ impl Hub {
     }
 
     /// The next event for a client.
-    pub fn take_event(&mut self, id: ClientId) -> Option<Event> {
+    pub fn take_event(&mut self, id: ClientId) -> Option<HubEvent> {
         self.clients.get_mut(&id)?.events.pop_front()
     }
 
     /// The port to the arm is open. Requests pass once a 7Bot V2 has answered.
     pub fn open_arm(&mut self, now: Instant) {
         self.forget_arm();
-        self.arm = ArmState::Identifying(now);
+        self.arm = ArmConnection::Identifying(now);
     }
 
     /// The port to the arm is closed.
     pub fn close_arm(&mut self) {
-        self.arm = ArmState::Absent;
+        self.arm = ArmConnection::Absent;
         self.forget_arm();
         self.deliver_all(Instant::ZERO);
     }
@@ -230,7 +230,7 @@ impl Hub {
     pub fn poll(&mut self, now: Instant) {
         self.deliver_all(now);
         self.clients.retain(|_, client| !client.has_left(now));
-        if self.arm == ArmState::Present || self.is_silent() {
+        if self.arm == ArmConnection::Present || self.is_silent() {
             if let Some(action) = self.watchdog.poll(now).filter(|_| !self.options.is_read_only) {
                 self.act(now, action);
             }
@@ -261,13 +261,13 @@ impl Hub {
         let line = self.line.deadline();
         let question = self.question_due().max(self.line.free_at(now));
         match self.arm {
-            ArmState::Absent => Instant::FAR_FUTURE,
-            ArmState::Identifying(_) => line.min(question),
-            ArmState::Silent(_) => line.min(question).min(urgent),
-            ArmState::Present if self.clients.values().any(|client| self.line.takes(client)) => {
+            ArmConnection::Absent => Instant::FAR_FUTURE,
+            ArmConnection::Identifying(_) => line.min(question),
+            ArmConnection::Silent(_) => line.min(question).min(urgent),
+            ArmConnection::Present if self.clients.values().any(|client| self.line.takes(client)) => {
                 line.min(self.line.free_at(now)).min(urgent)
             }
-            ArmState::Present => {
+            ArmConnection::Present => {
                 line.min(question).min(urgent).min(self.sampler.due().max(self.line.free_at(now)))
             }
         }

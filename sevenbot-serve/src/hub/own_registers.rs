@@ -1,7 +1,7 @@
 //! The registers that each client has for itself: the frequencies and the content of its reports.
 //!
 //! The server takes their values from a write, and sends 0 to the arm in their place. In the reply to a read it inserts the
-//! client's values. The other registers of the frame pass unchanged.
+//! client's values. This module leaves the other registers of the frame as they are.
 
 use protocol_core::registers::map::{FEEDBACK_FREQUENCY, OFFSET, REPORT_CONTENT};
 use protocol_core::registers::map21::{ANGLE_FEEDBACK_FREQUENCY, LOAD_FEEDBACK_FREQUENCY};
@@ -19,7 +19,8 @@ pub(crate) struct OwnRegisters {
     angles: u8,
     /// Frequency of the reports of present loads of map 2.1, in Hz.
     loads: u8,
-    /// The map of the client's last write. The arm's form of the offsets depends on it ([M5](protocol_core::decisions#m5)).
+    /// The map of the client's last write that the arm accepts. The arm's form of the offsets depends on it
+    /// ([M5](protocol_core::decisions#m5)).
     last_map: Option<Map>,
 }
 
@@ -51,7 +52,7 @@ impl OwnRegisters {
         *self != before
     }
 
-    /// The map that determines the form of the offsets in the reply to this read: the map of the client's last write, or
+    /// The map that determines the form of the offsets in the reply to this read: the map of the client's last accepted write, or
     /// `before_writes`. `None` if the read has no offsets.
     pub(crate) fn form_of_read(&self, address: u8, count: u8, before_writes: Map) -> Option<Map> {
         covers(&OFFSET, address, count.into()).then_some(self.last_map.unwrap_or(before_writes))

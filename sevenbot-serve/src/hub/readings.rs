@@ -19,7 +19,7 @@ const FRESH: Duration = Duration::from_millis(1_000);
 
 /// A reply or a report that holds positions.
 #[derive(Debug)]
-struct Reading {
+struct PositionReading {
     at: Instant,
     address: u8,
     values: Vec<u8>,
@@ -27,7 +27,7 @@ struct Reading {
 
 /// The last readings of a client.
 #[derive(Debug, Default)]
-pub(crate) struct Readings(VecDeque<Reading>);
+pub(crate) struct Readings(VecDeque<PositionReading>);
 
 impl Readings {
     /// Notes that the client got these values. Keeps them only if they hold positions.
@@ -39,14 +39,14 @@ impl Readings {
         if self.0.len() == KEPT {
             self.0.pop_front();
         }
-        self.0.push_back(Reading { at: now, address, values: values.to_vec() });
+        self.0.push_back(PositionReading { at: now, address, values: values.to_vec() });
     }
 
     /// The number of joints that a write holds; `None` if it has no targets, or sends a joint to another position than the
     /// client has read.
     pub(crate) fn held_joints(&self, now: Instant, address: u8, values: &[u8]) -> Option<usize> {
         let fresh = self.0.iter().rev().take_while(|reading| now - reading.at < FRESH);
-        let held = |reading: &Reading| {
+        let held = |reading: &PositionReading| {
             let coarse = reading.held(&TARGET_POSITION, &PRESENT_POSITION, address, values)?;
             Some(coarse + reading.held(&FINE_TARGET, &FINE_POSITION, address, values)?)
         };
@@ -54,7 +54,7 @@ impl Readings {
     }
 }
 
-impl Reading {
+impl PositionReading {
     /// The number of joints whose target in the write is the position of this reading; `None` if a joint has another
     /// target. A joint may also keep the fine target that this reading shows, within [`DROOP`] of its position. If the reading
     /// has the limits (register 188), fine positions are kept within them.

@@ -1,7 +1,7 @@
 //! Reports: the arm is read once at the highest frequency that any client wants; each client gets its own frequency.
 //!
 //! Reads are used, and not the arm's reports, for three reasons. A report of map 2.2 looks like the reply to a read.
-//! The arm ends the streams of one map when the other map is written. And every arm can be read.
+//! A write of one map can end the arm's streams of the other map ([M4](protocol_core::decisions#m4)). And every arm can be read.
 
 use protocol_core::report_kind::ReportKind;
 use protocol_core::time::Instant;

@@ -27,7 +27,7 @@ impl Hub {
         self.send_hold(now);
     }
 
-    /// Sends the next request or sample. Returns false if there is none.
+    /// Sends the next request or sample. Returns false if none can be sent now.
     pub(super) fn send_next(&mut self, now: Instant) -> bool {
         self.drop_stale(now);
         if self.sampler.begins_to_wait(now) {

@@ -1,8 +1,9 @@
 //! Fair use of the line: fair queueing by finish times, counted in bytes.
 //!
-//! Each client has a tag: the bytes up to which it has used the line. The request that would end at the lowest tag is next, so
-//! a short one does not wait for long ones that could begin at the same tag. A client that was idle starts at the lowest tag of
-//! those that wait. So its next request waits for few frames, however many frames the others have queued.
+//! Each client has a tag, a position on a line that is measured in bytes. A request moves its client's tag on by its length.
+//! The request that would end at the lowest tag is next, so a short one goes before long ones from the same tag. A client that
+//! was idle starts at the lowest tag of those that wait, unless its own is higher. So its next request waits for few frames,
+//! however many frames the others have queued.
 
 /// The tag of a client, and when it was served last.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -8,7 +8,7 @@
 //! ```
 //!
 //! The arm's watchdog sees the frames of all clients, and the samples. So once the client has been silent for the time of its
-//! watchdog, the hub does what the arm would do. A client that has left is silent, too. The arm's own watchdog acts if the
+//! watchdog, the hub holds the arm or damps its motors. A client that has left is silent, too. The arm's own watchdog acts if the
 //! server fails. It is set to [`LEAST_OF_ARM`] at least. A shorter one could act in a short pause of a busy server: joints
 //! that still brake after a stop would then hold at their set-points, not where the stop was confirmed. A read of register 186
 //! returns the value that the client wrote.

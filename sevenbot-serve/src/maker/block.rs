@@ -13,7 +13,7 @@ const DIRECTION_LENGTH: f64 = 127.0;
 
 /// A block that the arm solves as a whole.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Block {
+pub(super) enum IkBlock {
     /// The position of the wrist.
     Ik5,
     /// The position of the tip and the direction of the tool.
@@ -22,7 +22,7 @@ pub(super) enum Block {
     Ik7,
 }
 
-impl Block {
+impl IkBlock {
     /// The first register.
     pub(super) const fn address(self) -> u8 {
         match self {
@@ -98,23 +98,23 @@ fn direction(components: [f64; 3]) -> [u8; 3] {
 mod tests {
     use super::*;
 
-    fn values(block: Block, text: &str) -> Result<Vec<u8>, String> {
+    fn values(block: IkBlock, text: &str) -> Result<Vec<u8>, String> {
         block.values(&serde_json::from_str(text).unwrap())
     }
 
-    /// The golden frames of the maker's client.
+    /// The positions are those of the maker's golden frames. Their directions have length 1; here they are scaled to 127.
     #[test]
     fn blocks_are_encoded_as_the_makers_client_does() {
-        let ik5 = values(Block::Ik5, r#"{"pos":[-120,180,60]}"#).unwrap();
-        assert_eq!((Block::Ik5.address(), ik5), (68, vec![0x03, 0x88, 0x04, 0xB4, 0x04, 0x3C]));
-        let ik6 = values(Block::Ik6, r#"{"pos":[-50,185,50],"vec56":[0,0,-1]}"#).unwrap();
+        let ik5 = values(IkBlock::Ik5, r#"{"pos":[-120,180,60]}"#).unwrap();
+        assert_eq!((IkBlock::Ik5.address(), ik5), (68, vec![0x03, 0x88, 0x04, 0xB4, 0x04, 0x3C]));
+        let ik6 = values(IkBlock::Ik6, r#"{"pos":[-50,185,50],"vec56":[0,0,-1]}"#).unwrap();
         assert_eq!(
-            (Block::Ik6.address(), ik6),
+            (IkBlock::Ik6.address(), ik6),
             (54, vec![0x03, 0xCE, 0x04, 0xB9, 0x04, 0x32, 0x80, 0x80, 0x01])
         );
-        let ik7 = values(Block::Ik7, r#"{"pos":[100,200,150],"vec56":[0,0,1],"vec67":[0,2.5,0]}"#).unwrap();
+        let ik7 = values(IkBlock::Ik7, r#"{"pos":[100,200,150],"vec56":[0,0,1],"vec67":[0,2.5,0]}"#).unwrap();
         let directions = [0x80, 0x80, 0xFF, 0x80, 0xFF, 0x80];
-        assert_eq!((Block::Ik7.address(), ik7.len(), ik7.get(6..)), (54, 12, Some(directions.as_slice())));
+        assert_eq!((IkBlock::Ik7.address(), ik7.len(), ik7.get(6..)), (54, 12, Some(directions.as_slice())));
     }
 
     #[test]
@@ -137,7 +137,7 @@ mod tests {
             (r#"{"pos":[1,2,3],"vec56":[0,0,1]}"#, "Missing vec67 parameter"),
         ];
         for (text, message) in cases {
-            assert_eq!(values(Block::Ik7, text), Err(message.to_owned()), "{text}");
+            assert_eq!(values(IkBlock::Ik7, text), Err(message.to_owned()), "{text}");
         }
     }
 }

@@ -16,7 +16,7 @@ use serde_json::{Value, json};
 
 use super::block::has_solution;
 use super::command::{MakerCommand, MakerCommandError};
-use crate::hub::{Admission, ClientId, Event, HoldOutcome, Hub, WholeRequest};
+use crate::hub::{Admission, ClientId, HoldOutcome, Hub, HubEvent, WholeRequest};
 
 /// Answers that may wait for a client to take them. While there are this many, its commands wait.
 const MOST_ANSWERS: usize = 8;
@@ -29,7 +29,7 @@ const MOST_WAITING: usize = 400;
 
 /// An entry of the queue of messages.
 #[derive(Debug)]
-enum Waiting {
+enum WaitingMessage {
     /// A command, and the earliest time at which it can have been sent.
     Command(Instant, MakerCommand),
     Wrong(MakerCommandError),
@@ -46,11 +46,11 @@ enum Waiting {
 pub struct MakerClient {
     id: ClientId,
     is_browser: bool,
-    waiting: VecDeque<Waiting>,
+    waiting: VecDeque<WaitingMessage>,
     /// The command that has not ended: its read has no reply yet, or the arm has not confirmed the stop.
     current: Option<MakerCommand>,
     /// The first of two events that the command waits for.
-    first: Option<Event>,
+    first: Option<HubEvent>,
     answers: VecDeque<String>,
 }
 
@@ -82,8 +82,8 @@ impl MakerClient {
             return self.refuse(is_read(&command));
         }
         self.waiting.push_back(match command {
-            Ok(command) => Waiting::Command(since, command),
-            Err(error) => Waiting::Wrong(error),
+            Ok(command) => WaitingMessage::Command(since, command),
+            Err(error) => WaitingMessage::Wrong(error),
         });
     }
 
@@ -99,8 +99,8 @@ impl MakerClient {
             return;
         }
         match self.waiting.back_mut() {
-            Some(Waiting::Refused(count)) => *count += 1,
-            _ => self.waiting.push_back(Waiting::Refused(1)),
+            Some(WaitingMessage::Refused(count)) => *count += 1,
+            _ => self.waiting.push_back(WaitingMessage::Refused(1)),
         }
     }
 
@@ -119,31 +119,34 @@ impl MakerClient {
             }
             match self.waiting.pop_front() {
                 None => return,
-                Some(Waiting::Command(since, command)) => self.start(hub, now, since, command),
-                Some(Waiting::Wrong(MakerCommandError { message, is_read })) => {
+                Some(WaitingMessage::Command(since, command)) => self.start(hub, now, since, command),
+                Some(WaitingMessage::Wrong(MakerCommandError { message, is_read })) => {
                     self.answer(is_read, &error(&message));
                 }
-                Some(Waiting::Stopped(Admission::Queued)) => self.current = Some(MakerCommand::Stop),
-                Some(Waiting::Stopped(refused)) => self.answer(false, &done_or_refused("", refused)),
-                Some(Waiting::Dropped) => self.answer(false, &error("A stop came after this command")),
-                Some(Waiting::Refused(count)) => self.answer_refused(count),
+                Some(WaitingMessage::Stopped(Admission::Queued)) => self.current = Some(MakerCommand::Stop),
+                Some(WaitingMessage::Stopped(refused)) => self.answer(false, &done_or_refused("", refused)),
+                Some(WaitingMessage::Dropped) => self.answer(false, &error("A stop came after this command")),
+                Some(WaitingMessage::Refused(count)) => self.answer_refused(count),
             }
         }
     }
 
     /// Carries out the stops that wait, and drops the earlier commands that move the arm.
     fn stop_at_once(&mut self, hub: &mut Hub, now: Instant) {
-        let is_stop = |waiting: &Waiting| matches!(waiting, Waiting::Command(_, MakerCommand::Stop));
+        let is_stop =
+            |waiting: &WaitingMessage| matches!(waiting, WaitingMessage::Command(_, MakerCommand::Stop));
         let Some(last) = self.waiting.iter().rposition(is_stop) else { return };
         let admission = hub.stop_arm(now, self.id);
         for waiting in self.waiting.iter_mut().take(last + 1) {
             match waiting {
-                Waiting::Command(_, MakerCommand::Stop) => *waiting = Waiting::Stopped(admission),
-                Waiting::Command(_, command)
+                WaitingMessage::Command(_, MakerCommand::Stop) => {
+                    *waiting = WaitingMessage::Stopped(admission)
+                }
+                WaitingMessage::Command(_, command)
                     if admission == Admission::Queued
                         && request(command).is_some_and(|it| hub.moves_arm(now, self.id, &it)) =>
                 {
-                    *waiting = Waiting::Dropped;
+                    *waiting = WaitingMessage::Dropped;
                 }
                 _ => {}
             }
@@ -177,7 +180,7 @@ impl MakerClient {
     /// Answers the first of the commands that found no room.
     fn answer_refused(&mut self, count: usize) {
         if count > 1 {
-            self.waiting.push_front(Waiting::Refused(count - 1));
+            self.waiting.push_front(WaitingMessage::Refused(count - 1));
         }
         self.answers.push_back(no_room().to_string());
     }
@@ -197,19 +200,19 @@ impl MakerClient {
         self.answer(false, &answer);
     }
 
-    fn finish_read(&mut self, event: Event) {
+    fn finish_read(&mut self, event: HubEvent) {
         match (self.current.take(), event) {
             (
                 Some(command @ MakerCommand::InverseKinematics { .. }),
-                event @ (Event::Reply { .. } | Event::NoReply { .. }),
+                event @ (HubEvent::Reply { .. } | HubEvent::NoReply { .. }),
             ) => match self.first.take() {
                 None => (self.first, self.current) = (Some(event), Some(command)),
                 Some(before) => self.answer(false, &solution(&before, &event)),
             },
-            (Some(_), Event::Reply { values, .. }) => {
+            (Some(_), HubEvent::Reply { values, .. }) => {
                 self.answer(true, &json!({"status": "ok", "data": values}))
             }
-            (Some(command), Event::NoReply { .. }) => {
+            (Some(command), HubEvent::NoReply { .. }) => {
                 self.answer(is_read(&Ok(command)), &error("The arm does not answer"));
             }
             // Reports are not sent: the maker's programs take any message for an answer.
@@ -253,15 +256,12 @@ fn solving_writes(address: u8, values: &[u8]) -> Vec<(u8, Vec<u8>)> {
 }
 
 /// The answer to a block, from the arm's counter of refused frames before and after the writes. The counter shows a
-/// refusal, because no other client's frame is between the two reads.
-fn solution(before: &Event, after: &Event) -> Value {
+/// refusal, because no other client's frame is between the two reads. The maker's firmware has no such counter: there the answer
+/// means nothing.
+fn solution(before: &HubEvent, after: &HubEvent) -> Value {
     match (before, after) {
-        (Event::Reply { values: before, .. }, Event::Reply { values: after, .. }) => {
-            if before == after {
-                message("IK calculation completed")
-            } else {
-                error("IK calculation failed")
-            }
+        (HubEvent::Reply { values: before, .. }, HubEvent::Reply { values: after, .. }) => {
+            if before == after { message("IK calculation completed") } else { error("IK calculation failed") }
         }
         _ => error("The arm does not answer"),
     }

@@ -6,7 +6,7 @@ use protocol_core::registers::map::{MOTOR_STATE, SPEED, TARGET_POSITION, TIME, V
 use protocol_core::registers::{JOINTS, Register};
 use serde_json::Value;
 
-use super::block::Block;
+use super::block::IkBlock;
 
 /// What a message asks for.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -78,9 +78,9 @@ fn parse_named(name: &str, message: &Value) -> Result<MakerCommand, String> {
         "time" => each_joint(&TIME, message, "time", "Invalid time value (0-100, unit: 100ms)", "Time set"),
         "status" => status(message),
         "vacuum" => vacuum(message),
-        "IK5" => inverse_kinematics(Block::Ik5, message),
-        "IK6" => inverse_kinematics(Block::Ik6, message),
-        "IK7" => inverse_kinematics(Block::Ik7, message),
+        "IK5" => inverse_kinematics(IkBlock::Ik5, message),
+        "IK6" => inverse_kinematics(IkBlock::Ik6, message),
+        "IK7" => inverse_kinematics(IkBlock::Ik7, message),
         _ => Err("Unknown command".to_owned()),
     }
 }
@@ -176,7 +176,7 @@ fn vacuum(message: &Value) -> Result<MakerCommand, String> {
     Ok(MakerCommand::Write { address: VACUUM_PUMP.address, values: vec![value], done })
 }
 
-fn inverse_kinematics(block: Block, message: &Value) -> Result<MakerCommand, String> {
+fn inverse_kinematics(block: IkBlock, message: &Value) -> Result<MakerCommand, String> {
     let values = block.values(message)?;
     Ok(MakerCommand::InverseKinematics { address: block.address(), values })
 }

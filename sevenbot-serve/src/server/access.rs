@@ -31,11 +31,11 @@ impl std::fmt::Debug for AccessPolicy {
 }
 
 /// Why a request is refused: the status and a text.
-pub(super) type Refusal = (StatusCode, &'static str);
+pub(super) type HttpRefusal = (StatusCode, &'static str);
 
 impl AccessPolicy {
     /// Checks a request. Returns whether it came from a browser.
-    pub(super) fn check<B>(&self, request: &Request<B>) -> Result<bool, Refusal> {
+    pub(super) fn check<B>(&self, request: &Request<B>) -> Result<bool, HttpRefusal> {
         let header = |name: &str| request.headers().get(name).map(|value| value.to_str().unwrap_or_default());
         if request.uri().path() != PATH {
             return Err((StatusCode::NOT_FOUND, "The WebSocket is at /ws.\n"));

@@ -44,7 +44,7 @@ impl Places {
 
 /// The places of the connections, and the wrong tokens of each address.
 #[derive(Debug)]
-pub(super) struct Admission {
+pub(super) struct ConnectionAdmission {
     connections: Arc<Semaphore>,
     clients: Arc<Semaphore>,
     reserved: Arc<Semaphore>,
@@ -74,7 +74,7 @@ pub(super) struct TooManyWait;
 
 /// A connection that waits for the check of its token, until it is dropped.
 struct Turn<'a> {
-    admission: &'a Admission,
+    admission: &'a ConnectionAdmission,
     address: IpAddr,
 }
 
@@ -86,7 +86,7 @@ impl Drop for Turn<'_> {
     }
 }
 
-impl Admission {
+impl ConnectionAdmission {
     /// Places for so many clients, and for as many connections that have not shown their token: all programs of a server may come
     /// back at once.
     pub(super) fn new(most: usize) -> Arc<Self> {
@@ -212,7 +212,7 @@ mod tests {
     #[test]
     fn silent_connections_lose_their_places_to_the_next_ones() {
         run(async {
-            let admission = Admission::new(MOST);
+            let admission = ConnectionAdmission::new(MOST);
             let silent: Vec<_> = (0..MOST + 24)
                 .map(|_| {
                     let admission = Arc::clone(&admission);
@@ -250,7 +250,7 @@ mod tests {
     #[test]
     fn wrong_tokens_of_one_address_are_checked_one_after_the_other() {
         run(async {
-            let admission = Admission::new(MOST);
+            let admission = ConnectionAdmission::new(MOST);
             let address: IpAddr = "10.0.0.1".parse().unwrap();
             admission.note(Some(address), false);
             let start = Instant::now();
@@ -283,7 +283,7 @@ mod tests {
 
     #[test]
     fn each_wrong_token_makes_the_next_one_of_the_address_wait_longer() {
-        let admission = Admission::new(MOST);
+        let admission = ConnectionAdmission::new(MOST);
         let address: IpAddr = "10.0.0.1".parse().unwrap();
         let start = Instant::now();
         (0..6).for_each(|_| admission.note(Some(address), false));

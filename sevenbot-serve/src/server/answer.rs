@@ -10,7 +10,7 @@ use hyper::header::{CONTENT_TYPE, HeaderValue, LOCATION};
 use hyper::{Request, Response, StatusCode};
 use tungstenite::handshake::server::create_response_with_body;
 
-use super::access::{Refusal, is_address};
+use super::access::{HttpRefusal, is_address};
 
 /// Finds a file of the page by its path below the root, such as `index.html`.
 pub type PageFiles = fn(&str) -> Option<Cow<'static, [u8]>>;
@@ -36,36 +36,40 @@ pub(super) enum Protocol {
 }
 
 impl Protocol {
-    /// Does the connection have a reserved place? The teacher, and the pupil with the arm, are let in however many tabs there
-    /// are.
+    /// Does the connection have a reserved place? The teacher, and the pupil with the arm, are let in however many tabs of pupils
+    /// there are.
     pub(super) const fn has_reserved_place(self) -> bool {
         matches!(self, Self::Class(Role::Teacher) | Self::LentArm(_))
     }
 }
 
 #[derive(Debug)]
-pub(super) enum Answer {
+pub(super) enum HttpAnswer {
     /// A whole answer. The connection is closed after it.
     Whole(Response<Full<Bytes>>),
     /// The connection is a WebSocket after this.
     Upgrade(Response<Full<Bytes>>, Protocol),
 }
 
-pub(super) fn accept<B>(request: &Request<B>, protocol: Protocol) -> Result<Answer, Refusal> {
+pub(super) fn accept<B>(request: &Request<B>, protocol: Protocol) -> Result<HttpAnswer, HttpRefusal> {
     create_response_with_body(request, Full::default)
-        .map(|response| Answer::Upgrade(response, protocol))
+        .map(|response| HttpAnswer::Upgrade(response, protocol))
         .map_err(|_| (StatusCode::BAD_REQUEST, "This address takes WebSocket connections only.\n"))
 }
 
 /// The name by which the browser knows this server. It has to be an IP address or `localhost`.
-pub(super) fn own_host<B>(request: &Request<B>) -> Result<&str, Refusal> {
+pub(super) fn own_host<B>(request: &Request<B>) -> Result<&str, HttpRefusal> {
     header(request, "host")
         .filter(|host| is_address(host))
         .ok_or((StatusCode::FORBIDDEN, "Host: use the IP address of the server, or localhost.\n"))
 }
 
 /// Refuses the pages of other servers.
-pub(super) fn check_origin<B>(request: &Request<B>, host: &str, is_encrypted: bool) -> Result<(), Refusal> {
+pub(super) fn check_origin<B>(
+    request: &Request<B>,
+    host: &str,
+    is_encrypted: bool,
+) -> Result<(), HttpRefusal> {
     let scheme = if is_encrypted { "https://" } else { "http://" };
     let is_own = |origin: &str| origin.strip_prefix(scheme) == Some(host);
     if request.headers().contains_key("origin") && !header(request, "origin").is_some_and(is_own) {
@@ -79,7 +83,7 @@ pub(super) fn file<B>(
     request: &Request<B>,
     host: &str,
     is_encrypted: bool,
-) -> Result<Answer, Refusal> {
+) -> Result<HttpAnswer, HttpRefusal> {
     let path = request.uri().path().strip_prefix('/').unwrap_or_default();
     let path = if path.is_empty() { "index.html" } else { path };
     let body = files(path).ok_or((StatusCode::NOT_FOUND, "The page has no such file.\n"))?;
@@ -87,7 +91,7 @@ pub(super) fn file<B>(
     if let Ok(policy) = HeaderValue::from_str(&content_security_policy(host, is_encrypted)) {
         response.headers_mut().insert("content-security-policy", policy);
     }
-    Ok(Answer::Whole(response))
+    Ok(HttpAnswer::Whole(response))
 }
 
 fn header<'a, B>(request: &'a Request<B>, name: &str) -> Option<&'a str> {
@@ -99,10 +103,10 @@ pub(super) fn refusal(status: StatusCode, text: &'static str) -> Response<Full<B
 }
 
 /// Sends the browser to another address of this server.
-pub(super) fn redirect(location: &'static str) -> Answer {
+pub(super) fn redirect(location: &'static str) -> HttpAnswer {
     let mut response = refusal(StatusCode::SEE_OTHER, "");
     response.headers_mut().insert(LOCATION, HeaderValue::from_static(location));
-    Answer::Whole(response)
+    HttpAnswer::Whole(response)
 }
 
 fn response(status: StatusCode, content_type: &'static str, body: Bytes) -> Response<Full<Bytes>> {

@@ -10,14 +10,14 @@ use protocol_core::time::{Duration, Instant};
 use super::arm_location::{ArmLocation, PortSearch};
 use super::arm_serial::ArmSerial;
 use super::notice::Notice;
-use super::shared::Shared;
+use super::shared::SharedHub;
 use crate::hub::Hub;
 
 /// Time between two attempts to open the port.
 const RETRY_PERIOD: Duration = Duration::from_millis(500);
 /// Time after which an open port without an arm is opened anew: the device behind the path may be another one.
 const IDENTIFY_TIMEOUT: Duration = Duration::from_millis(3_000);
-/// As [`IDENTIFY_TIMEOUT`], while several ports are tried.
+/// As [`IDENTIFY_TIMEOUT`], with [`ArmLocation::Search`].
 const SEARCH_TIMEOUT: Duration = Duration::from_millis(1_000);
 
 /// The serial port of the arm.
@@ -49,7 +49,7 @@ impl ArmPort {
     }
 
     /// Serves the arm for ever.
-    pub(super) async fn serve(mut self, shared: Arc<Shared>, mut notify: impl FnMut(Notice)) {
+    pub(super) async fn serve(mut self, shared: Arc<SharedHub>, mut notify: impl FnMut(Notice)) {
         loop {
             let (deadline, has_output) = shared.with_hub(|hub, now| {
                 self.receive(hub, now, &mut notify);

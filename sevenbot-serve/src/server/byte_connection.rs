@@ -7,9 +7,9 @@ use protocol_core::time::Instant;
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
 
 use super::frame_session::FrameSession;
-use super::pace::Pace;
+use super::pace::ClientPace;
 use super::seat::End;
-use super::shared::Shared;
+use super::shared::SharedHub;
 
 /// Bytes that are read at once. Between two pieces of a flood other connections have their turns.
 const PIECE: usize = 512;
@@ -38,7 +38,7 @@ pub(super) struct First {
 /// # Errors
 /// The client's first byte does not begin a frame.
 pub(super) async fn serve(
-    shared: &Arc<Shared>,
+    shared: &Arc<SharedHub>,
     stream: impl ByteStream,
     First { bytes: first, since }: First,
 ) -> Result<(), NoFrames> {
@@ -46,7 +46,7 @@ pub(super) async fn serve(
     let mut client = FrameStream { session: FrameSession::open(shared), has_begun: false };
     // The last time at which no byte waited to be read. Bytes that are read now were sent later.
     let mut last_empty = since;
-    let mut pace = Pace::new(shared.baud);
+    let mut pace = ClientPace::new(shared.baud);
     let mut piece = vec![0; PIECE];
     client.put(last_empty, &first)?;
     let end = loop {

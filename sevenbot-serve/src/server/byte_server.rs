@@ -9,28 +9,28 @@ use tokio::io::AsyncReadExt;
 use tokio::net::{TcpListener, TcpStream};
 use tokio_rustls::TlsAcceptor;
 
-use super::admission::{Admission, TooManyWait};
+use super::admission::{ConnectionAdmission, TooManyWait};
 use super::breakage::Breakage;
 use super::byte_connection::{self, ByteStream, First, NoFrames};
 use super::listener::accept_tcp;
 #[cfg(unix)]
 use super::local_socket::LocalSocket;
 use super::notice::{Notice, Notices, RefusalReason};
-use super::shared::Shared;
+use super::shared::SharedHub;
 #[cfg(not(unix))]
 use super::unsupported::LocalSocket;
 use crate::token::is_equal;
 
-/// How long a client may take for the handshake of TLS, and to send the token.
+/// How long the handshake of TLS, the token, and the wait for its check may take together.
 const LOGIN_TIMEOUT: Duration = Duration::from_secs(5);
-/// The longest first line, which holds the token, in bytes.
+/// The first line holds the token. After this many bytes without a line feed it counts as whole.
 const LONGEST_LINE: usize = 256;
 
 /// The state that all connections of a TCP port, or of the Unix socket, share.
 #[derive(Clone)]
 pub(super) struct ByteServer {
-    pub(super) shared: Arc<Shared>,
-    pub(super) admission: Arc<Admission>,
+    pub(super) shared: Arc<SharedHub>,
+    pub(super) admission: Arc<ConnectionAdmission>,
     pub(super) notices: Notices,
     pub(super) token: Option<String>,
     pub(super) tls: Option<TlsAcceptor>,

@@ -5,32 +5,32 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use classroom::{ArmNews, Classroom, ConnectionId, LeaseId};
-use host_link::sharing::Command;
+use host_link::sharing::SharingCommand;
 use protocol_core::registers::Map;
 use protocol_core::time::Instant;
 use tokio::sync::{Notify, watch};
 
-use super::shared::{Shared, lock};
+use super::shared::{SharedHub, lock};
 use crate::hub::{ClientId, HoldOutcome, WholeRequest};
 
 /// Time between two polls of the class: a lease ends at most this late.
 const TICK: Duration = Duration::from_millis(50);
 
 /// Who may exchange frames with the real arm: the newest session of the present lease.
-type Session = Option<(LeaseId, u64)>;
+type LeaseSession = Option<(LeaseId, u64)>;
 
 /// A class, and the tasks to wake when it has messages.
 pub(super) struct Class {
-    shared: Arc<Shared>,
+    shared: Arc<SharedHub>,
     room: Mutex<Classroom>,
     wakes: Mutex<BTreeMap<ConnectionId, Arc<Notify>>>,
     /// The client of the hub by which the class stops the arm.
     client: ClientId,
-    session: watch::Sender<Session>,
+    session: watch::Sender<LeaseSession>,
 }
 
 impl Class {
-    pub(super) fn new(shared: Arc<Shared>, room: Classroom) -> Arc<Self> {
+    pub(super) fn new(shared: Arc<SharedHub>, room: Classroom) -> Arc<Self> {
         let client = shared.with_hub(|hub, _| {
             hub.watch_arm();
             hub.connect()
@@ -68,7 +68,7 @@ impl Class {
 
     fn serve_arm(&self, room: &mut Classroom, now: Instant) {
         if room.take_hold(now) {
-            let (address, values) = Command::Stop.write();
+            let (address, values) = SharingCommand::Stop.write();
             let stop = WholeRequest::Write { map: Map::V22, address, values: values.to_vec() };
             self.shared.with_client(|hub, now| hub.request(now, self.client, now, stop));
         }

@@ -11,7 +11,7 @@ use classroom::ConnectionId;
 use super::answer::Role;
 use super::class::Class;
 use super::seat::End;
-use super::web_socket::Session;
+use super::web_socket::SocketSession;
 
 /// A tab of a class. A dropped session is a lost connection.
 pub(super) struct ClassSession {
@@ -39,7 +39,7 @@ impl ClassSession {
     }
 }
 
-impl Session for ClassSession {
+impl SocketSession for ClassSession {
     fn advance(&mut self, can_send: bool) -> Option<Message> {
         if !can_send {
             return None;

@@ -13,8 +13,8 @@ use std::sync::Arc;
 
 use hyper::{Request, StatusCode};
 
-use super::access::{Refusal, token_of};
-use super::answer::{Answer, PageFiles, Protocol, Role, accept, check_origin, file, own_host, redirect};
+use super::access::{HttpRefusal, token_of};
+use super::answer::{HttpAnswer, PageFiles, Protocol, Role, accept, check_origin, file, own_host, redirect};
 use super::class::Class;
 use crate::token::is_equal;
 
@@ -52,7 +52,7 @@ impl ClassSite {
         [PUPIL, TEACHER, FRAMES].contains(&request.uri().path())
     }
 
-    pub(super) fn answer<B>(&self, request: &Request<B>) -> Result<Answer, Refusal> {
+    pub(super) fn answer<B>(&self, request: &Request<B>) -> Result<HttpAnswer, HttpRefusal> {
         let host = own_host(request)?;
         match request.uri().path() {
             PUPIL => self.messages(request, host, Role::Pupil),
@@ -63,7 +63,7 @@ impl ClassSite {
         }
     }
 
-    fn messages<B>(&self, request: &Request<B>, host: &str, role: Role) -> Result<Answer, Refusal> {
+    fn messages<B>(&self, request: &Request<B>, host: &str, role: Role) -> Result<HttpAnswer, HttpRefusal> {
         check_origin(request, host, self.is_encrypted)?;
         let (needed, refusal) = match role {
             Role::Pupil => (self.code.as_ref(), "Class code: ask the teacher.\n"),
@@ -77,7 +77,7 @@ impl ClassSite {
     }
 
     /// Only the pupil who has the arm may connect. Pages of other servers are refused.
-    fn frames<B>(&self, request: &Request<B>, host: &str) -> Result<Answer, Refusal> {
+    fn frames<B>(&self, request: &Request<B>, host: &str) -> Result<HttpAnswer, HttpRefusal> {
         check_origin(request, host, self.is_encrypted)?;
         let given = token_of(request.uri()).unwrap_or_default();
         let lease = self.class.lease_with(|key| is_equal(given.as_bytes(), key.as_bytes()));

@@ -11,7 +11,7 @@ const OF_EACH_KIND: usize = 2 + 2 + 1;
 #[cfg(unix)]
 const RESERVED: usize = 16;
 
-/// Descriptors that a class with all its tabs may take. Some systems allow a process 256, and more if it asks.
+/// Enough descriptors for a class with all its tabs. Some systems allow a process 256, and more if it asks.
 #[cfg(unix)]
 const WANTED: u64 = 2_048;
 /// Descriptors of a connection over the network.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use protocol_core::time::Instant;
 
 use super::seat::{End, Seat};
-use super::shared::Shared;
+use super::shared::SharedHub;
 use crate::frame_client::FrameClient;
 
 /// A client of the hub, and the bytes that the hub has no room for yet. A dropped session is a broken connection.
@@ -19,7 +19,7 @@ pub(super) struct FrameSession {
 }
 
 impl FrameSession {
-    pub(super) fn open(shared: &Arc<Shared>) -> Self {
+    pub(super) fn open(shared: &Arc<SharedHub>) -> Self {
         let connect = |hub: &mut _| FrameClient::connect(hub, shared.baud);
         let (seat, client) = Seat::take(shared, connect, FrameClient::id);
         Self { seat, client, input: Vec::new(), since: Instant::ZERO }

@@ -6,7 +6,7 @@ use classroom::{ClassInfo, Classroom, MOST_PUPILS};
 use tokio::net::TcpListener;
 use tokio_rustls::TlsAcceptor;
 
-use super::admission::{Admission, Places};
+use super::admission::{ConnectionAdmission, Places};
 use super::byte_server::ByteServer;
 use super::class::Class;
 use super::class_site::{self, ClassSite};
@@ -15,7 +15,7 @@ use super::descriptors;
 #[cfg(unix)]
 use super::local_socket::LocalSocket;
 use super::notice::Notices;
-use super::shared::Shared;
+use super::shared::SharedHub;
 use super::site::{ClassConfig, PageConfig, PageSite, Site};
 #[cfg(not(unix))]
 use super::unsupported::LocalSocket;
@@ -36,7 +36,7 @@ const PLACES: Places = Places {
 
 /// What the connections of the network share.
 pub(super) struct Network {
-    pub(super) shared: Arc<Shared>,
+    pub(super) shared: Arc<SharedHub>,
     pub(super) notices: Notices,
     pub(super) tls: Option<TlsAcceptor>,
 }
@@ -52,10 +52,10 @@ impl Network {
         page: Option<TcpListener>,
     ) {
         let most = descriptors::connections();
-        let admission = Admission::new(most);
+        let admission = ConnectionAdmission::new(most);
         // Programs of this user keep their places whatever the network does.
         let local = ByteServer {
-            admission: Admission::new(most),
+            admission: ConnectionAdmission::new(most),
             token: None,
             tls: None,
             ..self.bytes(config, &admission)
@@ -86,11 +86,12 @@ impl Network {
         let class = Class::new(Arc::clone(&self.shared), Classroom::new(info));
         tokio::spawn(Arc::clone(&class).run());
         let site = Site::Class(ClassSite { files, code, secret, class: Arc::clone(&class), is_encrypted });
-        let server = self.web(site, self.tls.clone(), &Admission::with(descriptors::fitting(PLACES)));
+        let server =
+            self.web(site, self.tls.clone(), &ConnectionAdmission::with(descriptors::fitting(PLACES)));
         tokio::spawn(WebServer { class: Some((class, new_key)), ..server }.serve(listener));
     }
 
-    fn bytes(&self, config: &ServerConfig, admission: &Arc<Admission>) -> ByteServer {
+    fn bytes(&self, config: &ServerConfig, admission: &Arc<ConnectionAdmission>) -> ByteServer {
         ByteServer {
             shared: Arc::clone(&self.shared),
             admission: Arc::clone(admission),
@@ -100,7 +101,7 @@ impl Network {
         }
     }
 
-    fn web(&self, site: Site, tls: Option<TlsAcceptor>, admission: &Arc<Admission>) -> WebServer {
+    fn web(&self, site: Site, tls: Option<TlsAcceptor>, admission: &Arc<ConnectionAdmission>) -> WebServer {
         WebServer {
             shared: Arc::clone(&self.shared),
             admission: Arc::clone(admission),

@@ -1,6 +1,6 @@
 //! Limits how fast the bytes of a client are taken. A flood of requests that the hub drops at once would keep the server
-//! busy, and delay a stop of another client. So no client is read much faster than at [`TIMES_LINE`] times the rate of the
-//! arm's line.
+//! busy, and delay a stop of another client. So no connected client is read much faster than at [`TIMES_LINE`] times the
+//! rate of the arm's line.
 
 use host_link::time_on_line;
 use protocol_core::time::{Duration, Instant};
@@ -12,13 +12,13 @@ const AHEAD: Duration = Duration::from_millis(20);
 
 /// The bytes of one client, timed as if they passed a line of [`TIMES_LINE`] times the arm's baud rate.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Pace {
+pub(super) struct ClientPace {
     /// The baud rate of the arm's line, in bits per second.
     baud: u32,
     passed: Instant,
 }
 
-impl Pace {
+impl ClientPace {
     pub(super) const fn new(baud: u32) -> Self {
         Self { baud, passed: Instant::ZERO }
     }
@@ -40,7 +40,7 @@ mod tests {
 
     #[test]
     fn a_client_is_read_four_times_as_fast_as_the_line() {
-        let (mut pace, mut now, mut taken) = (Pace::new(115_200), Instant::from_micros(5_000_000), 0);
+        let (mut pace, mut now, mut taken) = (ClientPace::new(115_200), Instant::from_micros(5_000_000), 0);
         let end = now + Duration::from_millis(1_000);
         while now < end {
             now = now.max(pace.free_at());

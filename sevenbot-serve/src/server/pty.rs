@@ -10,9 +10,9 @@ use tty_ports::pty::Pty;
 use tty_ports::symlink::Symlink;
 
 use super::frame_session::FrameSession;
-use super::pace::Pace;
+use super::pace::ClientPace;
 use super::readiness::Readiness;
-use super::shared::Shared;
+use super::shared::SharedHub;
 use super::start_error::StartError;
 
 /// Bytes that are read at once: the size of the kernel's read buffer.
@@ -35,12 +35,12 @@ impl PtyPort {
 
     /// Serves programs. When the last program has closed the terminal, its writes are still carried out and its streams of
     /// reports end. The next program becomes a new client.
-    pub(super) async fn serve(mut self, shared: Arc<Shared>) -> io::Result<()> {
+    pub(super) async fn serve(mut self, shared: Arc<SharedHub>) -> io::Result<()> {
         let master = Readiness::of(&self.pty.master())?;
         let opened = self.clients.as_ref().map(Readiness::of).transpose()?;
         let mut session = FrameSession::open(&shared);
         let mut last_empty = shared.now();
-        let mut pace = Pace::new(shared.baud);
+        let mut pace = ClientPace::new(shared.baud);
         // The session holds bytes of programs that have closed the terminal.
         let mut has_leftovers = false;
         loop {
@@ -80,8 +80,8 @@ impl PtyPort {
         &self,
         session: &mut FrameSession,
         last_empty: &mut Instant,
-        pace: &mut Pace,
-        shared: &Shared,
+        pace: &mut ClientPace,
+        shared: &SharedHub,
     ) -> io::Result<usize> {
         let is_free = session.has_room() && pace.free_at() <= shared.now();
         if !is_free && self.pty.has_client() {

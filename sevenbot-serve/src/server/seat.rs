@@ -5,7 +5,7 @@ use std::sync::Arc;
 use protocol_core::time::Instant;
 use tokio::sync::Notify;
 
-use super::shared::Shared;
+use super::shared::SharedHub;
 use crate::hub::{ClientId, Hub};
 
 /// How a connection ended.
@@ -20,7 +20,7 @@ pub(super) enum End {
 /// The place of a connection. If it is dropped without [`Seat::leave`], the connection counts as broken.
 #[derive(Debug)]
 pub(super) struct Seat {
-    shared: Arc<Shared>,
+    shared: Arc<SharedHub>,
     id: ClientId,
     wake: Arc<Notify>,
     end: End,
@@ -29,7 +29,7 @@ pub(super) struct Seat {
 impl Seat {
     /// Connects a client to the hub.
     pub(super) fn take<C>(
-        shared: &Arc<Shared>,
+        shared: &Arc<SharedHub>,
         connect: impl FnOnce(&mut Hub) -> C,
         id: impl FnOnce(&C) -> ClientId,
     ) -> (Self, C) {
@@ -38,7 +38,7 @@ impl Seat {
         (Self { shared: Arc::clone(shared), id, wake: shared.join(id), end: End::Broken }, client)
     }
 
-    pub(super) const fn shared(&self) -> &Arc<Shared> {
+    pub(super) const fn shared(&self) -> &Arc<SharedHub> {
         &self.shared
     }
 

@@ -12,7 +12,7 @@ use crate::hub::{ClientId, Hub};
 
 /// The hub, and the tasks to wake when it has news.
 #[derive(Debug)]
-pub(super) struct Shared {
+pub(super) struct SharedHub {
     hub: Mutex<Hub>,
     clients: Mutex<BTreeMap<ClientId, Arc<Notify>>>,
     /// Clients did something that the task of the arm's port has to look at.
@@ -47,7 +47,7 @@ impl Pulse {
     }
 }
 
-impl Shared {
+impl SharedHub {
     pub(super) fn new(hub: Hub, baud: u32) -> Arc<Self> {
         Arc::new(Self {
             hub: Mutex::new(hub),
@@ -113,7 +113,7 @@ impl Shared {
         self.arm.notified().await;
     }
 
-    /// Ends at this time of [`Shared::now`].
+    /// Ends at this time of [`SharedHub::now`].
     pub(super) async fn sleep_until(&self, time: Instant) {
         if time == Instant::FAR_FUTURE {
             std::future::pending().await

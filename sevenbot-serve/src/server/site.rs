@@ -8,8 +8,8 @@ use std::net::{IpAddr, SocketAddr};
 
 use hyper::{Method, Request, StatusCode};
 
-use super::access::{AccessPolicy, Refusal, token_of};
-use super::answer::{Answer, PageFiles, Protocol, accept, check_origin, file, own_host, refusal};
+use super::access::{AccessPolicy, HttpRefusal, token_of};
+use super::answer::{HttpAnswer, PageFiles, Protocol, accept, check_origin, file, own_host, refusal};
 use super::class_site::ClassSite;
 use super::new_key::NewKey;
 use crate::token::is_equal;
@@ -78,9 +78,12 @@ pub(super) struct PageSite {
 }
 
 impl Site {
-    pub(super) fn answer<B>(&self, request: &Request<B>) -> Answer {
+    pub(super) fn answer<B>(&self, request: &Request<B>) -> HttpAnswer {
         if request.method() != Method::GET {
-            return Answer::Whole(refusal(StatusCode::BAD_REQUEST, "This is no GET request of HTTP/1.1.\n"));
+            return HttpAnswer::Whole(refusal(
+                StatusCode::BAD_REQUEST,
+                "This is no GET request of HTTP/1.1.\n",
+            ));
         }
         let answer = match self {
             Self::Page(page) => page.answer(request),
@@ -89,7 +92,7 @@ impl Site {
                 access.check(request).and_then(|is_browser| accept(request, Protocol::Maker { is_browser }))
             }
         };
-        answer.unwrap_or_else(|(status, text)| Answer::Whole(refusal(status, text)))
+        answer.unwrap_or_else(|(status, text)| HttpAnswer::Whole(refusal(status, text)))
     }
 
     /// Is the answer public, so that it needs no secret?
@@ -103,14 +106,14 @@ impl Site {
 }
 
 impl PageSite {
-    fn answer<B>(&self, request: &Request<B>) -> Result<Answer, Refusal> {
+    fn answer<B>(&self, request: &Request<B>) -> Result<HttpAnswer, HttpRefusal> {
         let host = own_host(request)?;
         let is_frames = request.uri().path() == FRAMES;
         if is_frames { self.frames(request, host) } else { file(self.files, request, host, false) }
     }
 
     /// The token is needed, and pages of other servers are refused.
-    fn frames<B>(&self, request: &Request<B>, host: &str) -> Result<Answer, Refusal> {
+    fn frames<B>(&self, request: &Request<B>, host: &str) -> Result<HttpAnswer, HttpRefusal> {
         check_origin(request, host, false)?;
         let given = token_of(request.uri()).unwrap_or_default();
         if !is_equal(given.as_bytes(), self.token.as_bytes()) {
@@ -147,8 +150,8 @@ mod tests {
             format!("{} {:?}", response.status().as_u16(), response.headers())
         };
         match site.answer(&request.body(()).unwrap()) {
-            Answer::Whole(response) => Ok(text(response)),
-            Answer::Upgrade(response, _) => Err(text(response)),
+            HttpAnswer::Whole(response) => Ok(text(response)),
+            HttpAnswer::Upgrade(response, _) => Err(text(response)),
         }
     }
 

@@ -6,15 +6,15 @@ use tokio::sync::Notify;
 
 /// Ends a server from another thread, such as the thread of a signal handler. Copies end the same server.
 #[derive(Clone, Debug, Default)]
-pub struct Stop(Arc<Notify>);
+pub struct ServerStop(Arc<Notify>);
 
-impl Stop {
+impl ServerStop {
     /// Ends the server that runs with this stop. If none runs, the next one ends at once.
     pub fn stop(&self) {
         self.0.notify_one();
     }
 
-    /// Ends after [`Stop::stop`].
+    /// Ends after [`ServerStop::stop`].
     pub(super) async fn stopped(&self) {
         self.0.notified().await;
     }

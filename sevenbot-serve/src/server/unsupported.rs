@@ -4,7 +4,7 @@ use std::io;
 use std::path::Path;
 use std::sync::Arc;
 
-use super::shared::Shared;
+use super::shared::SharedHub;
 use super::start_error::StartError;
 
 #[derive(Debug)]
@@ -17,7 +17,7 @@ impl PtyPort {
         Err(StartError::NoPty)
     }
 
-    pub(super) async fn serve(self, _shared: Arc<Shared>) -> io::Result<()> {
+    pub(super) async fn serve(self, _shared: Arc<SharedHub>) -> io::Result<()> {
         match self {}
     }
 }

@@ -24,8 +24,8 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio_rustls::TlsAcceptor;
 use tower_http::compression::Compression;
 
-use super::admission::{Admission, Place, TooManyWait};
-use super::answer::{Answer, Protocol, refusal};
+use super::admission::{ConnectionAdmission, Place, TooManyWait};
+use super::answer::{HttpAnswer, Protocol, refusal};
 use super::breakage::Breakage;
 use super::byte_connection::ByteStream;
 use super::class::Class;
@@ -33,7 +33,7 @@ use super::class_session::ClassSession;
 use super::listener::{SEND_BUFFER, accept_tcp};
 use super::new_key::NewKey;
 use super::notice::{Notice, Notices, RefusalReason};
-use super::shared::{Shared, lock};
+use super::shared::{SharedHub, lock};
 use super::site::Site;
 use super::web_socket::{WebClient, serve_frames, serve_maker, serve_text};
 
@@ -49,8 +49,8 @@ const FILE_BUFFER: usize = 256 * 1_024;
 /// The state that all connections of a port share.
 #[derive(Clone)]
 pub(super) struct WebServer {
-    pub(super) shared: Arc<Shared>,
-    pub(super) admission: Arc<Admission>,
+    pub(super) shared: Arc<SharedHub>,
+    pub(super) admission: Arc<ConnectionAdmission>,
     pub(super) notices: Notices,
     pub(super) site: Site,
     pub(super) tls: Option<TlsAcceptor>,
@@ -145,14 +145,14 @@ impl WebServer {
             return refusal(StatusCode::TOO_MANY_REQUESTS, text);
         }
         let (response, protocol) = match self.site.answer(&request) {
-            Answer::Whole(response) => {
+            HttpAnswer::Whole(response) => {
                 if response.status() == StatusCode::UNAUTHORIZED {
                     self.admission.note(Some(peer.ip()), false);
                     self.refused(peer, RefusalReason::WrongToken);
                 }
                 return response;
             }
-            Answer::Upgrade(response, protocol) => (response, protocol),
+            HttpAnswer::Upgrade(response, protocol) => (response, protocol),
         };
         self.admission.note(Some(peer.ip()), true);
         let place = if protocol.has_reserved_place() {

@@ -15,9 +15,9 @@ use tungstenite::protocol::{Role, WebSocketConfig};
 use tungstenite::{Error, Message};
 
 use super::frame_session::FrameSession;
-use super::pace::Pace;
+use super::pace::ClientPace;
 use super::seat::{End, Seat};
-use super::shared::Shared;
+use super::shared::SharedHub;
 use crate::maker::MakerClient;
 
 /// The longest message of a page, in bytes.
@@ -100,13 +100,13 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Messages<S> {
 type Sending<S> = Pin<Box<dyn Future<Output = (Sink<S>, Result<(), Error>)> + Send>>;
 
 /// Sends one message after the other, while the task does other things.
-enum Sender<S> {
+enum MessageSender<S> {
     Idle(Sink<S>),
     Busy(Sending<S>),
     Failed,
 }
 
-impl<S: AsyncRead + AsyncWrite + Unpin + Send + 'static> Sender<S> {
+impl<S: AsyncRead + AsyncWrite + Unpin + Send + 'static> MessageSender<S> {
     const fn is_idle(&self) -> bool {
         matches!(self, Self::Idle(_))
     }
@@ -129,7 +129,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin + Send + 'static> Sender<S> {
     }
 }
 
-async fn open<S>(stream: S, longest: usize) -> (Sender<S>, Messages<S>)
+async fn open<S>(stream: S, longest: usize) -> (MessageSender<S>, Messages<S>)
 where
     S: AsyncRead + AsyncWrite + Unpin,
 {
@@ -142,11 +142,11 @@ where
     let metered = Metered { stream, unfinished: Arc::clone(&unfinished) };
     let socket = WebSocketStream::from_raw_socket(metered, Role::Server, Some(config)).await;
     let (sink, stream) = socket.split();
-    (Sender::Idle(sink), Messages { stream, unfinished })
+    (MessageSender::Idle(sink), Messages { stream, unfinished })
 }
 
 /// Processes the messages of one client.
-pub(super) trait Session {
+pub(super) trait SocketSession {
     /// Processes the messages and the news of the hub, as far as possible. Returns the next message for the client, if it
     /// `can_send` one.
     fn advance(&mut self, can_send: bool) -> Option<Message>;
@@ -161,7 +161,7 @@ pub(super) trait Session {
     /// Takes a message that the client sent at `since` or later.
     fn put(&mut self, since: Instant, message: Message);
 
-    /// Ends when [`Session::advance`] has something to do.
+    /// Ends when [`SocketSession::advance`] has something to do.
     fn news(&self) -> impl Future<Output = ()> + Send;
 
     /// The connection has ended.
@@ -169,7 +169,7 @@ pub(super) trait Session {
 }
 
 /// Frames in binary messages: the same bytes as over TCP. A frame may be spread over messages, and a message may hold several.
-impl Session for FrameSession {
+impl SocketSession for FrameSession {
     fn advance(&mut self, can_send: bool) -> Option<Message> {
         self.exchange();
         (can_send && !self.output().is_empty()).then(|| Message::binary(self.take_output()))
@@ -201,14 +201,14 @@ struct MakerSession {
 }
 
 impl MakerSession {
-    fn open(shared: &Arc<Shared>, is_browser: bool) -> Self {
+    fn open(shared: &Arc<SharedHub>, is_browser: bool) -> Self {
         let connect = |hub: &mut _| MakerClient::connect(hub, is_browser);
         let (seat, client) = Seat::take(shared, connect, MakerClient::id);
         Self { seat, client }
     }
 }
 
-impl Session for MakerSession {
+impl SocketSession for MakerSession {
     fn advance(&mut self, can_send: bool) -> Option<Message> {
         let Self { seat, client } = self;
         seat.shared().with_client(|hub, now| client.advance(hub, now));
@@ -250,7 +250,7 @@ pub(super) struct WebClient<S> {
 }
 
 /// Serves a client whose messages carry frames.
-pub(super) async fn serve_frames<S>(shared: &Arc<Shared>, client: WebClient<S>)
+pub(super) async fn serve_frames<S>(shared: &Arc<SharedHub>, client: WebClient<S>)
 where
     S: AsyncRead + AsyncWrite + Unpin + Send + 'static,
 {
@@ -258,7 +258,7 @@ where
 }
 
 /// Serves a client of the maker's WebSocket.
-pub(super) async fn serve_maker<S>(shared: &Arc<Shared>, client: WebClient<S>, is_browser: bool)
+pub(super) async fn serve_maker<S>(shared: &Arc<SharedHub>, client: WebClient<S>, is_browser: bool)
 where
     S: AsyncRead + AsyncWrite + Unpin + Send + 'static,
 {
@@ -266,8 +266,8 @@ where
 }
 
 /// Serves a client whose messages are text. `session` opens its session once the WebSocket is open.
-pub(super) async fn serve_text<S, T: Session>(
-    shared: &Shared,
+pub(super) async fn serve_text<S, T: SocketSession>(
+    shared: &SharedHub,
     client: WebClient<S>,
     session: impl FnOnce() -> T,
 ) where
@@ -277,8 +277,8 @@ pub(super) async fn serve_text<S, T: Session>(
 }
 
 /// Serves a client until it ends. `longest`: bytes of its longest message.
-async fn serve<S, T: Session>(
-    shared: &Shared,
+async fn serve<S, T: SocketSession>(
+    shared: &SharedHub,
     client: WebClient<S>,
     longest: usize,
     session: impl FnOnce() -> T,
@@ -289,7 +289,7 @@ async fn serve<S, T: Session>(
     let mut session = session();
     // The last time at which no message waited to be read. Messages that are read now were sent later.
     let mut last_empty = client.since;
-    let mut pace = Pace::new(shared.baud);
+    let mut pace = ClientPace::new(shared.baud);
     let mut end_at = Instant::FAR_FUTURE;
     let end = loop {
         if let Some(message) = session.advance(sender.is_idle()) {
@@ -334,7 +334,8 @@ async fn serve<S, T: Session>(
         }
     };
     session.close(end);
-    // Wait, so that a client that sent no whole message cannot connect again at once.
+    // Close the connection after this wait only. Otherwise a client could evade the pace by short connections without a whole
+    // message.
     pace.note(shared.now(), messages.take_count());
     shared.sleep_until(pace.free_at()).await;
 }

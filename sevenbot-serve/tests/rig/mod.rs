@@ -6,7 +6,7 @@ use arm_sim::flash::Flash;
 use arm_sim::plant::Plant;
 use arm_sim::simulated_arm::{ArmConfig, SimulatedArm};
 use motion_core::servo_bus::TorqueCodes;
-use protocol_core::request::{Reply, Report, Request};
+use protocol_core::request::{Reply, ReportMap21, Request};
 use protocol_core::time::{Duration, Instant};
 use protocol_core::wire::{Deframer, FrameBuffer, ToHost};
 use sevenbot_serve::hub::HubOptions;
@@ -332,7 +332,7 @@ impl Program {
             rest = &rest[self.deframer.push(now, rest)..];
             while let Some(frame) = self.deframer.pull() {
                 let frame = frame.expect("whole frames");
-                if let Some(report) = Report::from_frame(frame) {
+                if let Some(report) = ReportMap21::from_frame(frame) {
                     self.reports.push((report.address, report.values.to_vec()));
                     continue;
                 }

@@ -24,7 +24,7 @@ mod rounding;
 pub use fault::{StraightLineError, StraightLineFault};
 use path::TipPath;
 pub use rounding::TargetResolution;
-use rounding::{Angles, PlannedPose, Rounding};
+use rounding::{LineAngles, PlannedPose, Rounding};
 
 /// The largest turning speed of the tool, in degrees/s.
 const TURN_SPEED: f64 = 60.0;
@@ -149,7 +149,7 @@ impl LineTiming {
     fn follow(
         &self,
         path: &TipPath,
-        start: Angles,
+        start: LineAngles,
         request: &StraightLineRequest,
     ) -> Result<Vec<PlannedPose>, StraightLineError> {
         let rounding = Rounding { resolution: request.resolution, guard: request.guard };
@@ -219,7 +219,7 @@ impl<'a> GuardedLine<'a> {
     fn check(
         &mut self,
         share: f64,
-        exact: Angles,
+        exact: LineAngles,
         targets: Option<&PlannedPose>,
     ) -> Result<(), StraightLineError> {
         let Some(guard) = self.guard else { return Ok(()) };
@@ -240,7 +240,7 @@ struct JointTurn {
 }
 
 impl JointTurn {
-    fn between(from: Angles, to: Angles, share: f64) -> Self {
+    fn between(from: LineAngles, to: LineAngles, share: f64) -> Self {
         let turns = (1..).zip(from.iter().zip(to)).map(|(joint, (from, to))| (joint, (to - from).abs()));
         let (joint, degrees) = turns.fold((0, 0.0), |most, turn| if turn.1 > most.1 { turn } else { most });
         Self { joint, degrees, share }
@@ -251,9 +251,9 @@ impl JointTurn {
 fn solved(
     path: &TipPath,
     share: f64,
-    before: Angles,
+    before: LineAngles,
     guard: Option<&Guard>,
-) -> Result<Angles, StraightLineError> {
+) -> Result<LineAngles, StraightLineError> {
     let (tip, tool) = path.at(share);
     let all = ik6_all(tip, tool);
     let all = all.map_err(|why| {
@@ -263,10 +263,10 @@ fn solved(
             StraightLineFault::Unreachable(Box::new(Unreachable::because(why, tip, tool, guard))),
         )
     })?;
-    let furthest = |angles: &Angles| {
+    let furthest = |angles: &LineAngles| {
         angles.iter().zip(before).map(|(angle, before)| (angle - before).abs()).fold(0.0, f64::max)
     };
-    let free = |mut angles: Angles| {
+    let free = |mut angles: LineAngles| {
         // With the tool in line with the forearm, any angle of joint 4 is a solution. Joint 4 keeps its angle.
         if let ([_, _, _, t4, t5], [_, _, _, before, _]) = (&mut angles, before)
             && (*t5 - IN_LINE).abs() < 1e-6
@@ -285,7 +285,7 @@ fn solved(
 
 /// The angles at the start of the line. If the tool is in line with the forearm, joint 4 first turns to where the
 /// line needs it next.
-fn start_angles(request: &StraightLineRequest, path: &TipPath, pace: &LineTiming) -> Angles {
+fn start_angles(request: &StraightLineRequest, path: &TipPath, pace: &LineTiming) -> LineAngles {
     let [t1, t2, t3, t4, t5, ..] = request.start.map(FineAngle::degrees);
     let angles = [t1, t2, t3, t4, t5];
     if (t5 - IN_LINE).abs() > f64::EPSILON {

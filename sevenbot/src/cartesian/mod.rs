@@ -36,7 +36,7 @@ pub use guard::{
     BASE_MARGIN, Breach, Guard, JointPath, KEEP_OUT_RADIUS, KEEP_OUT_TOP, PathBreach, TimedBreach,
 };
 pub use jog::{Jog, JogAxes, JogRefusal};
-pub use kinematics::{NoSolution, Obstacle, Part};
+pub use kinematics::{FixedObstacle, NoSolution, Part};
 pub use line::{StraightLine, StraightLineError, StraightLineFault, StraightLineRequest, TargetResolution};
 pub use refusal::{GuardedTip, TipRefusal, Unreachable};
 pub use target::{FineTipTarget, TipTarget};
@@ -114,8 +114,8 @@ impl TipPose {
         Self { tip: hand.tip, tool: hand.tool, wrist: arm.wrist }
     }
 
-    /// The largest error, in millimetres, of a position that is computed from rounded angles: each joint may be off by half a
-    /// step.
+    /// An upper bound for the error, in millimetres, of a position that is computed from rounded angles: each joint may be off by
+    /// half a step.
     #[must_use]
     pub fn rounding_mm([t1, t2, t3, t4, t5, t6, _]: [FineAngle; 7], step: AngleStep) -> f64 {
         let angles = [t1, t2, t3, t4, t5, t6].map(FineAngle::degrees);

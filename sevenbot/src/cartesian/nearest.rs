@@ -23,8 +23,8 @@ const MIDDLE: Vector = Vector::new(0.0, 0.0, 75.0);
 /// The spacing of the finest grid, in millimetres.
 const FINE: f64 = 1.0 / TENTHS;
 
-/// The nearest point to `tip` that is within reach with the tool in this direction, and that the guard allows. `None` if
-/// the search finds none, or if `tip` is no position.
+/// The nearest point to `tip` that a search finds: within reach with the tool in this direction, and allowed by the guard. `None`
+/// if the search finds none, or if `tip` is no position.
 pub(super) fn nearest(tip: Vector, tool: Vector, guard: Option<&Guard>) -> Option<Vector> {
     if !tip.is_finite() {
         return None;

@@ -57,8 +57,8 @@ pub struct GuardedTip {
     pub tip: Vector,
     /// The requested direction of the tool.
     pub tool: Vector,
-    /// The nearest point that the guard allows with this direction of the tool, to a tenth of a millimetre. `None` if
-    /// the search finds none.
+    /// The nearest allowed point that a search finds with this direction of the tool, in tenths of a millimetre. `None` if it finds
+    /// none.
     pub nearest: Option<Vector>,
     /// A usual direction of the tool with which the guard allows the requested point; `None` if there is none.
     pub other_tool: Option<Vector>,
@@ -94,10 +94,11 @@ pub struct Unreachable {
     pub tip: Vector,
     /// The requested direction of the tool.
     pub tool: Vector,
-    /// The nearest point that the tip reaches with this direction of the tool and that the guard, if any, allows, to a tenth
-    /// of a millimetre. `None` if the search finds none, or if the requested tip is no position.
+    /// The nearest point within reach that a search finds with this direction of the tool, in tenths of a millimetre. The guard, if
+    /// any, allows it. `None` if the search finds none, or if the requested tip is no position.
     pub nearest: Option<Vector>,
-    /// A usual direction of the tool with which the tip reaches the requested point; `None` if there is none.
+    /// A usual direction of the tool with which the tip reaches the requested point, and the guard, if any, allows it. `None` if
+    /// there is none.
     pub other_tool: Option<Vector>,
 }
 

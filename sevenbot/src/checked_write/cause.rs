@@ -58,7 +58,7 @@ pub enum MismatchCause {
     /// The register holds the value, but its setting may not be stored: the settings storage has a fault or became full
     /// ([D19](protocol_core::decisions#d19)).
     NotStored,
-    /// The controller has restarted since the write, so its RAM registers hold their defaults.
+    /// The controller restarted before or after the write, so its RAM registers have the values of its start.
     Restarted,
     /// The arm received the frame damaged.
     Damaged,
@@ -76,7 +76,7 @@ impl MismatchCause {
     }
 }
 
-/// Why a server does not pass on the writes of a program.
+/// Why a server drops writes of a program: all of them, or those that move the arm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ServerReason {
     /// The server was started with `--read-only`.
@@ -88,7 +88,7 @@ pub enum ServerReason {
 }
 
 impl ServerReason {
-    /// `None` if the server passes writes on.
+    /// `None` if the server passes all writes on.
     pub(super) fn of(state: &SharingState) -> Option<Self> {
         match () {
             () if state.is_read_only => Some(Self::ReadOnly),

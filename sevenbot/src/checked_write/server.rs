@@ -1,4 +1,4 @@
-//! Asks a server between a program and the arm why it passes no writes on.
+//! Asks a server between a program and the arm why it drops writes.
 
 use host_link::Span;
 use host_link::sharing::{FIRST, SharingState};
@@ -10,8 +10,8 @@ use crate::arm::Arm;
 const SERVER: Option<Span> = Span::new(FIRST, 7);
 
 impl Arm {
-    /// Fills in missing causes: if a server in between passes no writes on, its reason becomes the cause of each register for
-    /// which the arm gives none.
+    /// Fills in missing causes: if a server in between drops writes, its reason becomes the cause of each register for which the
+    /// arm gives none.
     pub(crate) fn explained_by_server(&mut self, NotTaken(mut lost): NotTaken) -> NotTaken {
         let is_unknown = |register: &&mut WriteMismatch| register.cause == MismatchCause::Unknown;
         let mut unknown = lost.iter_mut().filter(is_unknown).peekable();
@@ -23,7 +23,7 @@ impl Arm {
         NotTaken(lost)
     }
 
-    /// `None` if there is no server, if it passes writes on, if its registers cannot be read, or without a status block.
+    /// `None` if there is no server, if it drops no writes, if its registers cannot be read, or without a status block.
     fn server_reason(&mut self) -> Option<ServerReason> {
         if !self.identity().has_status_block() {
             return None;

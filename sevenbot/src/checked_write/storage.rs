@@ -1,4 +1,4 @@
-//! Finds settings that the arm holds but could not store.
+//! Finds settings that the arm holds but may not have stored.
 
 use protocol_core::registers::map::fault;
 

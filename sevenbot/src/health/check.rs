@@ -1,7 +1,7 @@
 //! Checks during a move whether the arm still carries out the move, and gives the reason if it does not.
 //!
 //! ```text
-//!   MoveCheck::begin ──▶ check, check, ... (waits for the answer)   ──▶ Ok, or MoveCheckError::Problems
+//!   MoveCheck::begin ──▶ check, check, ... (waits for the answer)   ──▶ Ok, or MoveCheckError
 //!                    └─▶ poll, poll, ...   (does not wait: a stream) ──▶ the same
 //! ```
 //!

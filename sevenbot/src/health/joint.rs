@@ -42,7 +42,7 @@ pub struct JointHealth {
     pub is_gripping: Option<bool>,
     /// Does the servo hold no torque although it should ([D28](protocol_core::decisions#d28))?
     pub has_let_go: Option<bool>,
-    /// Is the joint driven, at rest, and within 3 degrees of its target?
+    /// Is the joint driven, at rest as far as the firmware tells, and within 3 degrees of its target?
     pub is_at_target: bool,
 }
 

@@ -37,8 +37,8 @@ const BITS_OF_FRAME: u128 = 70;
 pub(super) const SILENCE: Duration = Duration::from_millis(1_500);
 /// The smallest number of unanswered questions after which an arm is silent.
 const UNANSWERED_QUESTIONS: u32 = 3;
-/// A joint that was blocked before the move has this time to get free. A point of a stream does not clear the flag of a
-/// blocked joint, only free motion does (D27).
+/// A joint that was blocked before the move has this time to get free. In a stream the flag of a blocked joint goes only once
+/// the joint is free (D27).
 const TIME_TO_GET_FREE: Duration = Duration::from_secs(2);
 
 /// Why an arm does not carry out a move.

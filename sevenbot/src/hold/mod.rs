@@ -94,7 +94,7 @@ impl Arm {
     }
 }
 
-type Frames = Vec<(u8, Vec<u8>)>;
+type RegisterWrites = Vec<(u8, Vec<u8>)>;
 
 /// A stop in progress. All times count from the same instant.
 ///
@@ -117,11 +117,11 @@ pub struct Hold {
     has_restarted: bool,
     /// When the joints were read first.
     start: Option<Duration>,
-    /// The speeds to restore; `None` if the stop does not slow the joints down, or has restored them.
+    /// The speeds to restore at the end; `None` if there are none, or they were restored.
     speeds: Option<[u8; 7]>,
     /// Were the restored speeds written at least once?
     is_restoring: bool,
-    stage: Stage,
+    stage: HoldStage,
     /// A read shows the effect of the frames only if it was sent at this time or later.
     written: Duration,
     /// The time of the last write of the unconfirmed frames.
@@ -130,16 +130,16 @@ pub struct Hold {
 
 /// How far a stop has come.
 #[derive(Clone, Debug, Default)]
-enum Stage {
+enum HoldStage {
     /// The joints are to be read.
     #[default]
     Reading,
     /// A joint is not measured yet. The joints are to be read at this time.
     Waiting(Duration),
     /// These frames are to be written.
-    Writing(Frames),
+    Writing(RegisterWrites),
     /// These frames were written, and the joints are to be read.
-    Verifying(Frames),
+    Verifying(RegisterWrites),
     Ended(HoldStep),
 }
 
@@ -190,7 +190,7 @@ impl Hold {
         if known.is_some_and(|known| !known.joints.is_driven()) {
             return Self::default();
         }
-        let mut frames: Frames = Vec::new();
+        let mut frames: RegisterWrites = Vec::new();
         if known.is_some_and(HeldJoints::is_fine) {
             // With a period, a target would be one more point of a stream (D23).
             frames.push((SET_POINT_PERIOD.address, vec![0, 0]));
@@ -200,40 +200,40 @@ impl Hold {
         frames.extend(
             known.into_iter().flat_map(|known| known.frames(&known.targets_to_write(&[None; 7], false))),
         );
-        Self { speeds: Some(speeds), stage: Stage::Writing(frames), ..Self::default() }
+        Self { speeds: Some(speeds), stage: HoldStage::Writing(frames), ..Self::default() }
     }
 
     /// What is to be done at `now`. Call it again after each step, until a step ends the stop.
     pub fn poll(&mut self, now: Duration) -> HoldStep {
         match &self.stage {
-            Stage::Ended(end) => end.clone(),
-            Stage::Waiting(until) if now < *until => HoldStep::Wait(*until),
-            Stage::Writing(frames) => {
+            HoldStage::Ended(end) => end.clone(),
+            HoldStage::Waiting(until) if now < *until => HoldStep::Wait(*until),
+            HoldStage::Writing(frames) => {
                 let frames = frames.clone();
                 (self.written, self.repeated) = (now, now);
-                self.stage = Stage::Verifying(frames.clone());
+                self.stage = HoldStage::Verifying(frames.clone());
                 HoldStep::Write(frames)
             }
-            Stage::Verifying(frames) if self.speeds.is_some() && now >= self.repeated + REPEAT_PERIOD => {
+            HoldStage::Verifying(frames) if self.speeds.is_some() && now >= self.repeated + REPEAT_PERIOD => {
                 self.repeated = now;
                 HoldStep::Write(frames.clone())
             }
-            Stage::Reading | Stage::Waiting(_) | Stage::Verifying(_) => HoldStep::Read,
+            HoldStage::Reading | HoldStage::Waiting(_) | HoldStage::Verifying(_) => HoldStep::Read,
         }
     }
 
     /// Takes the joints that arrived at `now`, from reads that were sent at `asked` or later. Ignores joints from reads that
     /// were sent before the last frames.
     pub fn joints(&mut self, asked: Duration, now: Duration, joints: &HeldJoints) {
-        if asked < self.written || matches!(self.stage, Stage::Ended(_) | Stage::Writing(_)) {
+        if asked < self.written || matches!(self.stage, HoldStage::Ended(_) | HoldStage::Writing(_)) {
             return;
         }
         let start_up = *self.start.get_or_insert(now) + START_UP_TIME;
         self.stage = match self.step(joints, now >= start_up) {
-            HoldStep::Write(frames) => Stage::Writing(frames),
-            HoldStep::Wait(_) => Stage::Waiting(now + POLL_PERIOD),
-            HoldStep::Read => Stage::Reading,
-            end => Stage::Ended(end),
+            HoldStep::Write(frames) => HoldStage::Writing(frames),
+            HoldStep::Wait(_) => HoldStage::Waiting(now + POLL_PERIOD),
+            HoldStep::Read => HoldStage::Reading,
+            end => HoldStage::Ended(end),
         };
     }
 

@@ -39,7 +39,7 @@ impl Arm {
 }
 
 impl SetPointStream<'_> {
-    /// Streams the way to a first point, if it has a length. Afterwards the next point is due.
+    /// Streams the way to a first point, if its duration is not 0. Afterwards the next point is due.
     ///
     /// # Errors
     /// The observer ended the approach, this program paused for too long, the port failed, or the arm does not follow:

@@ -39,7 +39,7 @@ pub enum MoveError {
     /// The arm did not take these values.
     #[error(transparent)]
     NotTaken(#[from] NotTaken),
-    /// The arm may be moving, because it is unknown whether it took the values. Holds the reason.
+    /// The arm may be moving: it is unknown whether it took the values, or it did not take those that hold it. Holds the reason.
     #[error("the arm may still be moving: {0}")]
     MayMove(#[source] WriteError),
     /// The set-points of these joints still move.
@@ -50,7 +50,7 @@ pub enum MoveError {
         /// How long the call waited for them.
         after: Duration,
     },
-    /// Joints have settled away from their targets.
+    /// Joints are away from their targets after they settled, or had their time to settle.
     #[error(
         "the arm did not reach the pose: {}{}{}",
         away_text(away),
@@ -62,8 +62,8 @@ pub enum MoveError {
         away: Vec<(Joint, u8, u8)>,
         /// The joints whose servo does not answer; bit 0 is joint 1.
         missing: u8,
-        /// The joints that have another target by now; bit 0 is joint 1. Another program wrote it, or the arm did, when a servo
-        /// answered again elsewhere ([D12](protocol_core::decisions#d12)).
+        /// The joints that have another target by now; bit 0 is joint 1. Another program wrote it, or the arm did, for example
+        /// when a servo answered again elsewhere ([D12](protocol_core::decisions#d12)).
         retargeted: u8,
     },
     /// The arm was ordered to hold, but has got other targets since.
@@ -81,7 +81,7 @@ pub enum MoveError {
     /// The arm answers, but its reports have ended.
     #[error("the arm has stopped reporting its positions: was it switched off and on?")]
     ReportsStopped,
-    /// The first point of a stream or a recording is too far away. Nothing was moved.
+    /// The first point of a stream or a recording is too far away. No joint was moved towards it.
     #[error(transparent)]
     StartTooFar(#[from] StartTooFar),
     /// The arm's firmware takes no stream of set-points.

@@ -40,7 +40,7 @@ const RESTARTED: Problem = Problem::of_arm(ProblemKind::Restarted);
 pub type Targets = [Option<u8>; 7];
 
 impl Arm {
-    /// The joints after start-up: [`Arm::wait_until_settled`]. Ends a stream whose program is gone:
+    /// The joints after start-up: [`Arm::wait_until_settled`]. If the motors drive them, ends a stream whose program is gone:
     /// [`Arm::end_abandoned_stream`].
     ///
     /// # Errors
@@ -296,7 +296,7 @@ impl JointMove {
         away.filter(|(joint, is, goal)| is.abs_diff(*goal) > degrees && !grips(*joint)).collect()
     }
 
-    /// The degrees left, summed over all joints.
+    /// The degrees left, summed over the joints of this move.
     fn degrees_left(&self, present: &[u8; 7]) -> u64 {
         self.away(present, 0, MoveState::default())
             .iter()

@@ -7,7 +7,7 @@
 //!   Arm::with_reports ──▶ Recorder::next ──▶ moments                        ┘
 //! ```
 //!
-//! All calls block on the clock of the arm's line.
+//! Calls that wait use the clock of the arm's line.
 
 mod approach;
 mod drive;

@@ -7,7 +7,7 @@ use crate::arm::Arm;
 /// What a call does at the moment, and the unit of its progress.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
-    /// Joints move to their targets. In degrees, summed over all joints.
+    /// Joints move to their targets. In degrees, summed over these joints.
     Moving,
     /// The joints have nearly arrived. In degrees.
     Settling,

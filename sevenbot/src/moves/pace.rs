@@ -137,7 +137,7 @@ impl PaceBefore {
         }
     }
 
-    /// As [`Self::put_back`], also while a joint moves: for an arm that was made to hold.
+    /// As [`Self::put_back`], also while a joint moves, which may then change its speed.
     ///
     /// # Errors
     /// The registers do not take the values, or an exchange failed.

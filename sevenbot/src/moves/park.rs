@@ -49,8 +49,8 @@ const CREEPS_HUNDREDTHS: u16 = 30;
 /// Why an arm is not parked.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ParkError {
-    /// The move to the pose failed: the motors are as they were. Or, after the arm was let go, the check failed for another
-    /// reason than a sinking joint.
+    /// The move to the pose or the restoring of the speeds failed: the motors are as they were. Or the order to let go failed, or
+    /// the check after it, for another reason than a sinking joint.
     #[error(transparent)]
     Move(#[from] MoveError),
     /// The joint sank when it was let go. The motors drive it again, and the arm holds.
@@ -60,7 +60,7 @@ pub enum ParkError {
         joint.number()
     )]
     Sinks {
-        /// The joint that moved first.
+        /// The joint that was seen to move; of several, the one with the lowest number.
         joint: Joint,
     },
 }
@@ -75,12 +75,12 @@ impl Arm {
     /// Moves slowly to a pose, restores the speeds and durations, lets the arm go (motor state 0), and checks that it stays.
     /// Returns the positions at the end of the check.
     ///
-    /// `pose`: `None` is [`PARK_POSE`], which is right for an arm with an empty gripper. The check takes 2 s in that pose, and
-    /// 15 s in any other.
+    /// `pose`: `None` is [`PARK_POSE`], which is right for an arm with an empty gripper. The check then takes 2 s, otherwise 15 s.
     ///
     /// # Errors
-    /// The arm does not reach the pose, or an exchange failed. Or a joint moves by more than 2 degrees when it is let go, still
-    /// moves after 5 seconds or has a problem, or the observer ends the check: then the arm holds again.
+    /// The motors do not drive the joints, the arm does not reach the pose, or an exchange failed. Or a joint moves by more than
+    /// 2 degrees when it is let go, still moves after 5 seconds or has a problem, or the observer ends the check: then the arm
+    /// holds again.
     pub fn park(
         &mut self,
         pose: Option<FineTargets>,

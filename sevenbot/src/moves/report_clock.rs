@@ -2,7 +2,7 @@
 //!
 //! The arm reports without drift (D14), but USB adapters and a busy host deliver late, and several reports at once. So
 //! a report gets the tick that follows the previous report's tick. It gets a later tick only if the later one is nearest
-//! to its arrival: then reports were lost.
+//! to its arrival: then reports count as lost.
 
 use std::time::{Duration, Instant};
 

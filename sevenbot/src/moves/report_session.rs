@@ -21,8 +21,8 @@ impl Arm {
         Ok(if has_block { report_content::FINE_POSITIONS } else { report_content::POSITIONS })
     }
 
-    /// Runs `work` while the arm sends `hz` reports a second. `content` is the value of register 189 for them. Restores
-    /// registers 53 and 189 afterwards, also after a failure.
+    /// Runs `work` while the arm sends `hz` reports a second, or fewer on a slow line. `content` is the value of register 189 for
+    /// them. Restores registers 53 and 189 afterwards, also after a failure of `work`.
     ///
     /// # Errors
     /// Those of `work`, and of [`Arm::write_checked`].

@@ -46,8 +46,8 @@ pub struct Announcement {
 }
 
 impl Announcement {
-    /// Announces a server that listens on a TCP port, at all addresses of this computer if `address` is unspecified.
-    /// `is_encrypted`: with TLS.
+    /// Announces a server that listens on a TCP port, at all addresses of this computer if `address` is unspecified; for 0.0.0.0
+    /// only those of IPv4. `is_encrypted`: with TLS.
     ///
     /// # Errors
     /// The system has no multicast, or the name is not fit for it.

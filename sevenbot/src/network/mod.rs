@@ -1,5 +1,5 @@
 //! Arms that are not at a serial port: behind `sevenbot serve`, or simulated in this program. An address takes the place of
-//! the port's name. Also lists the servers of this computer.
+//! the port's name. Also lists the servers of this user on this computer.
 //!
 //! ```text
 //!   tcp://HOST:PORT ──▶ address ──▶ socket_line ──▶ Arm

@@ -21,32 +21,32 @@ const WRITE_TIMEOUT: Duration = Duration::from_secs(2);
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// A stream of bytes whose reads have a timeout.
-trait Stream: Read + Write + Send + Sync {
+trait TimedStream: Read + Write + Send + Sync {
     fn set_timeout(&self, timeout: Duration) -> io::Result<()>;
 }
 
-impl Stream for TcpStream {
+impl TimedStream for TcpStream {
     fn set_timeout(&self, timeout: Duration) -> io::Result<()> {
         self.set_read_timeout(Some(timeout))
     }
 }
 
 #[cfg(unix)]
-impl Stream for UnixStream {
+impl TimedStream for UnixStream {
     fn set_timeout(&self, timeout: Duration) -> io::Result<()> {
         self.set_read_timeout(Some(timeout))
     }
 }
 
 #[cfg(feature = "tls")]
-impl Stream for super::tls::TlsStream {
+impl TimedStream for super::tls::TlsStream {
     fn set_timeout(&self, timeout: Duration) -> io::Result<()> {
         self.sock.set_read_timeout(Some(timeout))
     }
 }
 
 /// A line to an arm behind a server.
-pub struct SocketLine(Box<dyn Stream>);
+pub struct SocketLine(Box<dyn TimedStream>);
 
 impl fmt::Debug for SocketLine {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -79,7 +79,7 @@ impl SocketLine {
 
 /// Connects to a server of the local network: at the address that it announces now, or else at its last known address.
 /// Remembers an announced address.
-fn connect_named(name: &str, token: Option<&str>) -> Result<Box<dyn Stream>, OpenError> {
+fn connect_named(name: &str, token: Option<&str>) -> Result<Box<dyn TimedStream>, OpenError> {
     if let Some(known) = announced(name) {
         let stream = connect_known(&known, token)?;
         // Ignore a failure: a name that is announced works without a remembered address.
@@ -91,7 +91,7 @@ fn connect_named(name: &str, token: Option<&str>) -> Result<Box<dyn Stream>, Ope
 }
 
 /// Connects to a known server. Its certificate has to match its name, because its address may change.
-fn connect_known(known: &KnownName, token: Option<&str>) -> Result<Box<dyn Stream>, OpenError> {
+fn connect_known(known: &KnownName, token: Option<&str>) -> Result<Box<dyn TimedStream>, OpenError> {
     match &known.address {
         Address::Tls(address) => connect_tcp(address, Some(&known.name), token),
         Address::Tcp(address) => connect_tcp(address, None, token),
@@ -110,7 +110,11 @@ const fn announced(_: &str) -> Option<KnownName> {
 }
 
 /// `host`: the connection is encrypted, and the certificate must be for this host; `None`: no encryption.
-fn connect_tcp(address: &str, host: Option<&str>, token: Option<&str>) -> Result<Box<dyn Stream>, OpenError> {
+fn connect_tcp(
+    address: &str,
+    host: Option<&str>,
+    token: Option<&str>,
+) -> Result<Box<dyn TimedStream>, OpenError> {
     let addresses =
         std::net::ToSocketAddrs::to_socket_addrs(address).map_err(|error| match error.kind() {
             ErrorKind::InvalidInput => OpenError::Unusable(
@@ -135,11 +139,11 @@ fn host(address: &str) -> &str {
     host.trim_start_matches('[').trim_end_matches(']')
 }
 
-fn log_in(stream: TcpStream, host: Option<&str>, token: Option<&str>) -> io::Result<Box<dyn Stream>> {
+fn log_in(stream: TcpStream, host: Option<&str>, token: Option<&str>) -> io::Result<Box<dyn TimedStream>> {
     stream.set_nodelay(true)?;
     stream.set_write_timeout(Some(WRITE_TIMEOUT))?;
     stream.set_read_timeout(Some(CONNECT_TIMEOUT))?;
-    let mut stream: Box<dyn Stream> = match host {
+    let mut stream: Box<dyn TimedStream> = match host {
         None => Box::new(stream),
         Some(host) => encrypt(stream, host)?,
     };
@@ -150,18 +154,18 @@ fn log_in(stream: TcpStream, host: Option<&str>, token: Option<&str>) -> io::Res
 }
 
 #[cfg(feature = "tls")]
-fn encrypt(stream: TcpStream, host: &str) -> io::Result<Box<dyn Stream>> {
+fn encrypt(stream: TcpStream, host: &str) -> io::Result<Box<dyn TimedStream>> {
     Ok(Box::new(super::tls::connect(stream, host)?))
 }
 
 #[cfg(not(feature = "tls"))]
-fn encrypt(_: TcpStream, _: &str) -> io::Result<Box<dyn Stream>> {
+fn encrypt(_: TcpStream, _: &str) -> io::Result<Box<dyn TimedStream>> {
     Err(io::Error::other("this program was built without TLS"))
 }
 
 #[cfg(unix)]
-fn connect_unix(path: &std::path::Path) -> Result<Box<dyn Stream>, OpenError> {
-    let connect = || -> io::Result<Box<dyn Stream>> {
+fn connect_unix(path: &std::path::Path) -> Result<Box<dyn TimedStream>, OpenError> {
+    let connect = || -> io::Result<Box<dyn TimedStream>> {
         let stream = UnixStream::connect(path)?;
         stream.set_write_timeout(Some(WRITE_TIMEOUT))?;
         Ok(Box::new(stream))
@@ -170,7 +174,7 @@ fn connect_unix(path: &std::path::Path) -> Result<Box<dyn Stream>, OpenError> {
 }
 
 #[cfg(not(unix))]
-fn connect_unix(_: &std::path::Path) -> Result<Box<dyn Stream>, OpenError> {
+fn connect_unix(_: &std::path::Path) -> Result<Box<dyn TimedStream>, OpenError> {
     Err(OpenError::Unusable("this system has no Unix sockets".to_owned()))
 }
 

@@ -50,7 +50,7 @@ pub struct Recording {
     moments: Vec<(usize, Moment)>,
 }
 
-/// Why a text is not a recording, or cannot be played.
+/// Why a text or a list of moments is not a recording, or cannot be played.
 ///
 /// ```
 /// use sevenbot::recording::{Recording, RecordingError};

@@ -202,7 +202,7 @@ impl BusMaster {
         std::mem::take(&mut self.received.damaged_frames)
     }
 
-    /// Waits until no byte arrives for `silence`. Frames that arrive meanwhile are late answers.
+    /// Waits until no byte arrives for `silence`. Frames that arrive meanwhile count as late answers, except echoes of questions.
     pub(crate) fn wait_for_silence(&mut self, silence: Duration) -> Result<(), ServoError> {
         loop {
             self.find_answer(&[], |_| false);

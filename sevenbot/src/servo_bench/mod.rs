@@ -7,7 +7,7 @@
 //! ```
 //!
 //! Talks to SCS servos through a half-duplex TTL adapter. Disconnect the arm's controller from the bus first: two
-//! masters must not share one bus. All calls block, with timeouts.
+//! masters must not share one bus. Exchanges block, with timeouts.
 //!
 //! ```no_run
 //! use sevenbot::servo_bench::{BusOptions, BusMaster, servo_info::ServoInfo};

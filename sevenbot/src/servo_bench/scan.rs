@@ -96,7 +96,7 @@ impl ScanPlan {
         Self { rates: vec![baud], ids: 0..=super::MAX_ID, wait }
     }
 
-    /// The number of questions in the first pass.
+    /// The number of questions in the first pass, if the adapter supports all rates.
     #[must_use]
     pub fn questions(&self) -> usize {
         self.rates.len() * self.ids.len()
@@ -107,8 +107,8 @@ impl ScanPlan {
     }
 }
 
-/// Scans the bus. Calls `on_progress` after each question of the first pass, and after each rate. The bus keeps the last rate
-/// that the adapter supports.
+/// Scans the bus. Calls `on_progress` after each question of the first pass, and after each rate that the adapter supports. The
+/// bus keeps the last of these rates.
 ///
 /// # Errors
 /// The port failed.

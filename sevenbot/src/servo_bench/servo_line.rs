@@ -9,7 +9,7 @@ pub trait ServoLine: HostLine {
     /// Changes the baud rate.
     ///
     /// # Errors
-    /// [`ServoError::NoSuchRate`] if the adapter does not support the rate.
+    /// [`ServoError::NoSuchRate`] if the adapter does not support the rate, or its port failed.
     fn set_baud(&mut self, baud: u32) -> Result<(), ServoError>;
 }
 

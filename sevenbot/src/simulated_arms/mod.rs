@@ -5,8 +5,9 @@
 //!                       └─ groups of arms, each taken by the next free thread
 //! ```
 //!
-//! The controllers parse real frames, and an observation is the reply to a read. The line takes no time, so the reply is
-//! there at once. Each arm has a time, faults and a seed of its own, so the results do not depend on the number of threads.
+//! The controllers parse real frames, and an observation is the reply to a read. The line takes no time, so without a fault the
+//! reply is there at once. Each arm has a time, faults and a seed of its own, so the results do not depend on the number of
+//! threads.
 //!
 //! ```
 //! use sevenbot::simulated_arms::{POSITIONS, SimulatedArms, WIDTH};

@@ -41,8 +41,8 @@ pub struct LatestCounts {
 ///
 /// A point is due each period. It is the newest action; without a new one the last point is sent again, so that a damaged frame
 /// costs no action. Once the program has offered nothing for the time of the watchdog, nothing more is sent but an action that
-/// waits for its point. The watchdog of the arm acts when its time has passed since the last frame (D24). The joints
-/// stand at the last point then (D23).
+/// waits for its point. The watchdog of the arm acts when its time has passed since the last frame (D24). If that time is longer
+/// than two periods and a control cycle, joints that keep up stand at the last point by then (D23).
 ///
 /// ```
 /// use sevenbot::FineAngle;

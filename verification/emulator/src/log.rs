@@ -45,7 +45,7 @@ impl Log {
         Ok(Self { control_block, printed_to: 0, input, _printer: printer })
     }
 
-    /// Prints the new part of the log.
+    /// Prints what the firmware logged since the last call.
     pub(crate) fn print_new(&mut self, monitor: &mut Monitor) -> TaskResult {
         let block = monitor.memory(self.control_block, CONTROL_BLOCK)?;
         let field = |at: usize| {

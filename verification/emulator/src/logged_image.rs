@@ -16,7 +16,7 @@ use crate::process::{ChildProcess, TIMEOUT, TaskResult};
 use crate::trace::TraceEvent;
 use crate::{frame, start_servos};
 
-/// The time after which the arm has processed a request and sleeps.
+/// The time after which the arm has usually processed a request and sleeps.
 const IDLE_TIME: Duration = Duration::from_millis(20);
 /// The time after which the arm has usually processed a byte and sleeps. It is short, because logging takes time.
 const BYTE_TIME: Duration = Duration::from_millis(5);

@@ -97,7 +97,7 @@ pub fn between(events: &[TraceEvent], is_mark: impl Fn(&TraceEvent) -> bool) -> 
 }
 
 /// The calls of the handler at `entry`, from its first instruction to its return. Leaves out calls that a handler of `entries`
-/// interrupts.
+/// interrupts, and a call whose return is not in `events`.
 pub fn handler_calls<'a>(
     events: &'a [TraceEvent],
     entry: u64,

@@ -11,7 +11,8 @@ pub enum Error {
     Misused(NorFlashErrorKind),
     /// Erases are forbidden: see [`Flash::forbid_erase`](crate::Flash::forbid_erase).
     EraseForbidden,
-    /// The word was programmed before with another value, completely or in part, or held one when the flash was created.
+    /// The word has another value, and was not erased since. The value may come from an interrupted program operation, or from
+    /// the creation of the flash.
     ProgrammedTwice,
     /// An erase of the sector was cut half way, and no complete erase followed.
     HalfErased,

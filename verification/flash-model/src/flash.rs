@@ -39,7 +39,7 @@ struct Bits {
 #[derive(Clone, Debug)]
 pub struct Flash<const SECTOR: usize, const WORD: usize = 4> {
     cells: Vec<u8>,
-    /// For each word, the value that a program operation requested, or its value at the start. All ones after an erase.
+    /// For each word, the value that a program operation requested, or its value at the start. All ones after a complete erase.
     requested: Vec<u8>,
     /// Bits that may read differently after the next power-up.
     marginal: Vec<Bits>,

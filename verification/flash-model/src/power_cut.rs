@@ -4,7 +4,7 @@
 
 use crate::random::Random;
 
-/// The bits of a word that a cut operation changes. All other bits keep their value.
+/// The bits of a word that an operation changes. All other bits keep their value.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Torn {
     /// Bits that read 0 now.
@@ -34,7 +34,7 @@ pub enum ProgramTear {
     MarginalWord,
     /// All bits are programmed but one, which is marginal.
     OneMarginal,
-    /// All bits are programmed but two, which are marginal. A code that corrects single errors cannot repair this.
+    /// All bits are programmed but two, which are marginal. A code that corrects single errors may fail to repair this.
     TwoMarginal,
     /// One bit is marginal, the others are unchanged. Half of the power-ups show the old word.
     FaintOne,

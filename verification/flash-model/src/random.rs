@@ -58,7 +58,7 @@ mod tests {
 
     #[test]
     fn a_seed_gives_the_sequence_of_the_reference_implementation() {
-        // From https://prng.di.unimi.it/splitmix64.c. Every recorded seed relies on this sequence.
+        // From https://prng.di.unimi.it/splitmix64.c. The recorded seeds of its users rely on this sequence.
         let mut random = Random::new(1_234_567);
         assert_eq!(random.next(), 6_457_827_717_110_365_317);
         assert_eq!(random.next(), 3_203_168_211_198_807_973);

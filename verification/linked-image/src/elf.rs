@@ -54,7 +54,7 @@ pub struct Section {
 
 /// The place in the source that an instruction comes from. It prints as `file:line`.
 pub struct SourceLine {
-    /// The file: its path in the workspace, or in its package.
+    /// The file: its path in the workspace, or in the folder of its library or registry.
     pub file: String,
     /// True for a file of this workspace.
     pub is_ours: bool,

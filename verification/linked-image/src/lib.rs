@@ -6,7 +6,7 @@
 //!    instruction)        a jump)           lines)      stack)
 //! ```
 //!
-//! This crate does not know the project's programs: `xtask` names them, and compares the figures with budgets.
+//! This crate does not know the project's programs: its callers name them, and `xtask` compares the figures with budgets.
 
 use std::error::Error;
 

@@ -12,12 +12,12 @@ use crate::thumb_decode::Effect;
 /// Bytes that the core pushes for an exception: 26 words with floating point, and one for alignment (ARMv7-M reference
 /// manual, B1.5.7).
 const EXCEPTION_FRAME: u64 = 27 * 4;
-/// Functions that set the stack pointer, to the top of the stack.
+/// Functions that begin with an empty stack. They may set the stack pointer, to the top of the stack.
 const SETS_STACK: &[&str] = &["Reset", "HardFault"];
 
 /// Calls that are left out: from each of these functions of the logger to the panic. The logger panics if a log frame begins
-/// inside another, and the panic handler logs, so these calls close a cycle. The handler logs only when it is entered for the
-/// first time (`crash.rs`, `ENTERED`), so the cycle is executed once.
+/// inside another or ends without a beginning, and the panic handler logs, so these calls close a cycle. The handler logs only
+/// when it is entered for the first time (`crash.rs`, `ENTERED`), so the cycle is executed once.
 const GUARDS: (&[&str], &str) = (&["_defmt_acquire", "_defmt_release"], "core::panicking::panic_fmt");
 
 /// The largest stack of a function with its callees.

@@ -14,7 +14,7 @@ use protocol_core::wire::FrameBuffer;
 
 use crate::shared::free_moves::{FreeMoves, Step};
 
-/// The time from power-up to the first move.
+/// The time from power-up to the first write.
 const START: Duration = Duration::from_millis(1_000);
 
 /// What some motions showed. Each is carried out with and without protection.

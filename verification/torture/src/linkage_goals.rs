@@ -16,7 +16,7 @@ const ROUNDING: i32 = 2 * 2 * 212_000;
 pub(crate) struct LinkageGoals(Option<i32>);
 
 impl LinkageGoals {
-    /// Forgets the smallest excess, because a joint engaged anew, an offset changed, or the limit is off.
+    /// Forgets the smallest excess, for example because a joint engaged anew, an offset changed, or the limit is off.
     pub(crate) fn reset(&mut self) {
         self.0 = None;
     }

@@ -38,7 +38,7 @@ const PANIC_PAUSE: Duration = Duration::from_millis(2);
 /// Joint 3, which lifts the forearm.
 pub const FOREARM: Joint = Joint::ALL[2];
 
-/// A failure that may cause a sag.
+/// The failures whose sag is measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SagCause {
     /// The controller alone restarts at once.
@@ -248,7 +248,8 @@ mod tests {
 
     #[test]
     fn a_restart_of_the_controller_costs_at_most_a_droop() {
-        // The measured position, rounded to a count, is the new goal (D12), so each joint droops once more.
+        // The controller keeps the goal of a servo within 3 degrees of its joint (D12). Otherwise the measured position, rounded
+        // to a count, is the new goal, and the joint droops once more.
         for cause in [SagCause::WarmRestart, SagCause::Watchdog] {
             let sag = Sag::over(cause);
             for (joint, droop) in Joint::ALL.into_iter().zip(droops()) {

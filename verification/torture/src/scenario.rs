@@ -66,7 +66,8 @@ pub struct Scenario {
     pub faults: &'static [InjectedFault],
     /// The number of writes of settings in a thousand writes, apart from those for the extended block.
     pub settings_per_mille: u64,
-    /// The number of power cuts in a hundred starts.
+    /// The number of starts in a hundred for which a power cut is planned. A start with too few operations of the flash leaves it
+    /// to a later save.
     pub cut_starts_percent: u64,
 }
 

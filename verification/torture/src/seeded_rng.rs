@@ -52,7 +52,7 @@ impl SeededRng {
     }
 
     /// A time from `shortest` to `longest`, with more short times than [`Self::between`] gives: at least half of the times are at
-    /// most a third of `longest`, at least a quarter at most a ninth, and so on.
+    /// most a third of `longest`, at least a quarter at most a ninth, and so on down to `shortest`.
     pub fn any_scale(&mut self, shortest: Duration, longest: Duration) -> Duration {
         let mut limit = longest;
         while limit > shortest && self.one_in(2) {

@@ -37,9 +37,9 @@ counts! {
     undetected_errors,
     /// Changes of a servo fault, and restarts of a servo.
     servo_faults,
-    /// Walls, pushes, things and changes of the payload.
+    /// Walls, pushes, things and changes of the payload. A thing counts even if the claws have no room for it.
     obstacles,
-    /// Alarms that were forced on servos.
+    /// Alarms that were forced on servos, without the repeated overloads.
     servo_trips,
     /// Cuts of the supply of the servos alone.
     emergency_stops,

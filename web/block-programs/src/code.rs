@@ -3,14 +3,14 @@
 
 use sevenbot::Joint;
 
-use crate::command::{Sensor, Tool};
+use crate::command::{NamedDirection, Sensor};
 use crate::fault::BlockId;
 use crate::program::{Arithmetic, Comparison, Variable};
 use crate::value::Value;
 
 /// One step of the machine. Its operands are on top of the stack, the last one topmost.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Step {
+pub(crate) enum MachineInstruction {
     /// A block begins: the interpreter returns an event, so that its caller decides when to go on.
     Begin,
     Push(Value),
@@ -50,9 +50,9 @@ pub(crate) enum Act {
     /// Seven angles in degrees, duration in seconds.
     Pose,
     /// x, y, z in mm, speed in degrees per second.
-    MoveTip(Tool),
+    MoveTip(NamedDirection),
     /// x, y, z in mm, speed in mm/s.
-    Line(Tool),
+    Line(NamedDirection),
     Grip(bool),
     Vacuum(bool),
     /// Duration in seconds.
@@ -60,12 +60,12 @@ pub(crate) enum Act {
 }
 
 /// A step and the block that it belongs to.
-pub(crate) type Instruction = (Step, BlockId);
+pub(crate) type LocatedInstruction = (MachineInstruction, BlockId);
 
-/// All instructions of a program: first the body of the program, which ends with [`Step::End`], then the functions.
+/// All instructions of a program: first the body of the program, which ends with [`MachineInstruction::End`], then the functions.
 #[derive(Debug, Default)]
 pub(crate) struct Code {
-    pub(crate) instructions: Vec<Instruction>,
+    pub(crate) instructions: Vec<LocatedInstruction>,
     /// The index of the first instruction of each function.
     pub(crate) functions: Vec<usize>,
     pub(crate) globals: usize,

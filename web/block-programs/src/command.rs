@@ -19,7 +19,7 @@ pub(crate) const CLAW: [f64; 2] = [84.0, 0.0];
 
 /// A command for the arm. The program goes on when the arm has carried it out.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Command {
+pub enum ProgramCommand {
     /// Joints go to targets.
     Joints {
         /// One target for each joint; `None` for a joint that does not move.
@@ -84,7 +84,7 @@ pub enum Axis {
 
 /// The direction in which the tool points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Tool {
+pub(crate) enum NamedDirection {
     Down,
     Forward,
     Left,
@@ -92,7 +92,7 @@ pub(crate) enum Tool {
     Up,
 }
 
-impl Tool {
+impl NamedDirection {
     /// The direction as a unit vector: x, y, z.
     pub(crate) const fn direction(self) -> [i8; 3] {
         match self {

@@ -1,8 +1,8 @@
 //! Compiles the tree of a program to instructions.
 
-use crate::code::{Act, Code, Instruction, Step};
+use crate::code::{Act, Code, LocatedInstruction, MachineInstruction};
 use crate::fault::BlockId;
-use crate::program::{Expression, ExpressionKind, Function, Program, Statement, StatementKind};
+use crate::program::{Expression, ExpressionKind, Program, Statement, StatementKind, UserFunction};
 use crate::value::Value;
 
 /// The result of a function that returns no value.
@@ -11,14 +11,14 @@ const NO_RESULT: Value = Value::Number(0.0);
 pub(crate) fn compile(program: &Program) -> Code {
     let mut compiler = Compiler::default();
     compiler.statements(&program.body);
-    compiler.add(Step::End, &"".into());
+    compiler.add(MachineInstruction::End, &"".into());
     let functions = program.functions.iter().map(|function| compiler.function(function)).collect();
     Code { instructions: compiler.instructions, functions, globals: program.variables.len() }
 }
 
 #[derive(Default)]
 struct Compiler {
-    instructions: Vec<Instruction>,
+    instructions: Vec<LocatedInstruction>,
     loops: Vec<Loop>,
 }
 
@@ -32,12 +32,12 @@ struct Loop {
 }
 
 impl Compiler {
-    fn add(&mut self, step: Step, block: &BlockId) {
+    fn add(&mut self, step: MachineInstruction, block: &BlockId) {
         self.instructions.push((step, block.clone()));
     }
 
     /// As [`Self::add`]. Returns the index of the instruction.
-    fn place(&mut self, step: Step, block: &BlockId) -> usize {
+    fn place(&mut self, step: MachineInstruction, block: &BlockId) -> usize {
         self.add(step, block);
         self.instructions.len() - 1
     }
@@ -46,7 +46,10 @@ impl Compiler {
     fn land(&mut self, jump: usize) {
         let next = self.instructions.len();
         if let Some((
-            Step::Jump(to) | Step::JumpIfFalse(to) | Step::JumpKeepingIf { to, .. } | Step::NextRound(to),
+            MachineInstruction::Jump(to)
+            | MachineInstruction::JumpIfFalse(to)
+            | MachineInstruction::JumpKeepingIf { to, .. }
+            | MachineInstruction::NextRound(to),
             _,
         )) = self.instructions.get_mut(jump)
         {
@@ -55,14 +58,14 @@ impl Compiler {
     }
 
     /// Compiles a function. Returns the index of its first instruction.
-    fn function(&mut self, function: &Function) -> usize {
-        let begin = self.place(Step::Begin, &function.block);
+    fn function(&mut self, function: &UserFunction) -> usize {
+        let begin = self.place(MachineInstruction::Begin, &function.block);
         self.statements(&function.body);
         match &function.result {
             Some(result) => self.expression(result),
-            None => self.add(Step::Push(NO_RESULT), &function.block),
+            None => self.add(MachineInstruction::Push(NO_RESULT), &function.block),
         }
-        self.add(Step::Return, &function.block);
+        self.add(MachineInstruction::Return, &function.block);
         begin
     }
 
@@ -71,13 +74,13 @@ impl Compiler {
     }
 
     fn statement(&mut self, Statement { block, kind }: &Statement) {
-        let act = |compiler: &mut Self, act| compiler.add(Step::Act(act), block);
+        let act = |compiler: &mut Self, act| compiler.add(MachineInstruction::Act(act), block);
         match kind {
             StatementKind::Repeat { times, body } => return self.repeat(block, times, body),
             StatementKind::While { condition, body } => return self.repeat_while(block, condition, body),
             _ => {}
         }
-        self.add(Step::Begin, block);
+        self.add(MachineInstruction::Begin, block);
         match kind {
             StatementKind::MoveJoint { joint, angle, speed } => {
                 self.expressions([angle, speed]);
@@ -85,7 +88,7 @@ impl Compiler {
             }
             StatementKind::Pose { angles, seconds } => {
                 for number in angles.iter().chain([seconds]) {
-                    self.add(Step::Push(Value::Number(*number)), block);
+                    self.add(MachineInstruction::Push(Value::Number(*number)), block);
                 }
                 act(self, Act::Pose);
             }
@@ -105,24 +108,24 @@ impl Compiler {
             }
             StatementKind::Set(variable, value) => {
                 self.expression(value);
-                self.add(Step::Store(*variable), block);
+                self.add(MachineInstruction::Store(*variable), block);
             }
             StatementKind::Change(variable, by) => {
-                self.add(Step::Load(*variable), block);
+                self.add(MachineInstruction::Load(*variable), block);
                 self.expression(by);
-                self.add(Step::Calculate(crate::program::Arithmetic::Add), block);
-                self.add(Step::Store(*variable), block);
+                self.add(MachineInstruction::Calculate(crate::program::Arithmetic::Add), block);
+                self.add(MachineInstruction::Store(*variable), block);
             }
             StatementKind::Call { function, arguments } => {
                 self.call(block, *function, arguments);
-                self.add(Step::Pop, block);
+                self.add(MachineInstruction::Pop, block);
             }
             StatementKind::Return(condition, value) => self.return_if(block, condition, value.as_ref()),
             StatementKind::If { branches, otherwise } => self.branches(block, branches, otherwise),
             StatementKind::Break => self.leave_loop(block),
             StatementKind::Continue => {
                 let head = self.loops.last().map_or(0, |inner| inner.head);
-                self.add(Step::Jump(head), block);
+                self.add(MachineInstruction::Jump(head), block);
             }
             StatementKind::Repeat { .. } | StatementKind::While { .. } => {}
         }
@@ -130,16 +133,16 @@ impl Compiler {
 
     fn repeat(&mut self, block: &BlockId, times: &Expression, body: &[Statement]) {
         self.expression(times);
-        self.add(Step::Count, block);
-        let head = self.place(Step::Begin, block);
-        let exit = self.place(Step::NextRound(0), block);
+        self.add(MachineInstruction::Count, block);
+        let head = self.place(MachineInstruction::Begin, block);
+        let exit = self.place(MachineInstruction::NextRound(0), block);
         self.rounds(block, body, Loop { head, is_counted: true, exits: vec![exit] });
     }
 
     fn repeat_while(&mut self, block: &BlockId, condition: &Expression, body: &[Statement]) {
-        let head = self.place(Step::Begin, block);
+        let head = self.place(MachineInstruction::Begin, block);
         self.expression(condition);
-        let exit = self.place(Step::JumpIfFalse(0), block);
+        let exit = self.place(MachineInstruction::JumpIfFalse(0), block);
         self.rounds(block, body, Loop { head, is_counted: false, exits: vec![exit] });
     }
 
@@ -147,16 +150,16 @@ impl Compiler {
         let head = inner.head;
         self.loops.push(inner);
         self.statements(body);
-        self.add(Step::Jump(head), block);
+        self.add(MachineInstruction::Jump(head), block);
         let exits = self.loops.pop().map(|inner| inner.exits).unwrap_or_default();
         exits.into_iter().for_each(|exit| self.land(exit));
     }
 
     fn leave_loop(&mut self, block: &BlockId) {
         if self.loops.last().is_some_and(|inner| inner.is_counted) {
-            self.add(Step::Pop, block);
+            self.add(MachineInstruction::Pop, block);
         }
-        let exit = self.place(Step::Jump(0), block);
+        let exit = self.place(MachineInstruction::Jump(0), block);
         if let Some(inner) = self.loops.last_mut() {
             inner.exits.push(exit);
         }
@@ -164,12 +167,12 @@ impl Compiler {
 
     fn return_if(&mut self, block: &BlockId, condition: &Expression, value: Option<&Expression>) {
         self.expression(condition);
-        let over = self.place(Step::JumpIfFalse(0), block);
+        let over = self.place(MachineInstruction::JumpIfFalse(0), block);
         match value {
             Some(value) => self.expression(value),
-            None => self.add(Step::Push(NO_RESULT), block),
+            None => self.add(MachineInstruction::Push(NO_RESULT), block),
         }
-        self.add(Step::Return, block);
+        self.add(MachineInstruction::Return, block);
         self.land(over);
     }
 
@@ -182,9 +185,9 @@ impl Compiler {
         let mut ends = Vec::new();
         for (condition, body) in branches {
             self.expression(condition);
-            let next = self.place(Step::JumpIfFalse(0), block);
+            let next = self.place(MachineInstruction::JumpIfFalse(0), block);
             self.statements(body);
-            ends.push(self.place(Step::Jump(0), block));
+            ends.push(self.place(MachineInstruction::Jump(0), block));
             self.land(next);
         }
         self.statements(otherwise);
@@ -193,7 +196,7 @@ impl Compiler {
 
     fn call(&mut self, block: &BlockId, function: usize, arguments: &[Expression]) {
         self.expressions(arguments);
-        self.add(Step::Call { function, arguments: arguments.len() }, block);
+        self.add(MachineInstruction::Call { function, arguments: arguments.len() }, block);
     }
 
     fn expressions<'a>(&mut self, expressions: impl IntoIterator<Item = &'a Expression>) {
@@ -202,23 +205,25 @@ impl Compiler {
 
     fn expression(&mut self, Expression { block, kind }: &Expression) {
         match kind {
-            ExpressionKind::Number(number) => self.add(Step::Push(Value::Number(*number)), block),
-            ExpressionKind::Truth(truth) => self.add(Step::Push(Value::Truth(*truth)), block),
-            ExpressionKind::Variable(variable) => self.add(Step::Load(*variable), block),
-            ExpressionKind::Sense(sensor) => self.add(Step::Sense(*sensor), block),
+            ExpressionKind::Number(number) => {
+                self.add(MachineInstruction::Push(Value::Number(*number)), block)
+            }
+            ExpressionKind::Truth(truth) => self.add(MachineInstruction::Push(Value::Truth(*truth)), block),
+            ExpressionKind::Variable(variable) => self.add(MachineInstruction::Load(*variable), block),
+            ExpressionKind::Sense(sensor) => self.add(MachineInstruction::Sense(*sensor), block),
             ExpressionKind::Calculate(operation, pair) => {
                 self.expressions(pair.iter());
-                self.add(Step::Calculate(*operation), block);
+                self.add(MachineInstruction::Calculate(*operation), block);
             }
             ExpressionKind::Compare(comparison, pair) => {
                 self.expressions(pair.iter());
-                self.add(Step::Compare(*comparison), block);
+                self.add(MachineInstruction::Compare(*comparison), block);
             }
             ExpressionKind::And(pair) => self.choose(block, pair, false),
             ExpressionKind::Or(pair) => self.choose(block, pair, true),
             ExpressionKind::Not(inner) => {
                 self.expression(inner);
-                self.add(Step::Not, block);
+                self.add(MachineInstruction::Not, block);
             }
             ExpressionKind::Call { function, arguments } => self.call(block, *function, arguments),
         }
@@ -228,7 +233,7 @@ impl Compiler {
     /// one does not decide the result.
     fn choose(&mut self, block: &BlockId, [one, other]: &[Expression; 2], truth: bool) {
         self.expression(one);
-        let end = self.place(Step::JumpKeepingIf { truth, to: 0 }, block);
+        let end = self.place(MachineInstruction::JumpKeepingIf { truth, to: 0 }, block);
         self.expression(other);
         self.land(end);
     }

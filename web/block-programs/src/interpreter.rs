@@ -1,7 +1,7 @@
 //! Runs a program without input or output: returns its commands and its reads of sensors, one at a time.
 
-use crate::code::{Act, Code, Step};
-use crate::command::{CLAW, Command, Sensor, angle, joint_pace, line_speed, timed_pace, wait};
+use crate::code::{Act, Code, MachineInstruction};
+use crate::command::{CLAW, ProgramCommand, Sensor, angle, joint_pace, line_speed, timed_pace, wait};
 use crate::compile::compile;
 use crate::fault::{BlockId, ProgramError, ProgramFault};
 use crate::program::{Program, Variable};
@@ -14,11 +14,11 @@ pub const MOST_CALLS: usize = 200;
 
 /// The next thing that a program does.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Event {
+pub enum ProgramEvent {
     /// This block begins. The program goes on at the next call of [`Interpreter::advance`].
     Begin(BlockId),
     /// The arm has to do this before the program goes on.
-    Command(Command),
+    Command(ProgramCommand),
     /// The program reads this sensor. Call [`Interpreter::answer`] before the next [`Interpreter::advance`].
     Sensor(Sensor),
     /// The program is over. Every further call returns this again.
@@ -28,14 +28,14 @@ pub enum Event {
 /// A program that runs.
 ///
 /// ```
-/// use block_programs::{Event, Interpreter, Program};
+/// use block_programs::{Interpreter, Program, ProgramEvent};
 ///
 /// let workspace = r#"{"blocks": {"blocks": [{"type": "arm_start", "id": "a", "next": {"block":
 ///     {"type": "arm_vacuum", "id": "b", "fields": {"STATE": "ON"}}}}]}}"#;
 /// let mut run = Interpreter::new(&Program::parse(workspace)?);
-/// assert_eq!(run.advance()?, Event::Begin("b".into()));
-/// assert_eq!(run.advance()?, Event::Command(block_programs::Command::Vacuum(true)));
-/// assert_eq!(run.advance()?, Event::Over);
+/// assert_eq!(run.advance()?, ProgramEvent::Begin("b".into()));
+/// assert_eq!(run.advance()?, ProgramEvent::Command(block_programs::ProgramCommand::Vacuum(true)));
+/// assert_eq!(run.advance()?, ProgramEvent::Over);
 /// # Ok::<(), block_programs::ProgramError>(())
 /// ```
 #[derive(Debug)]
@@ -66,80 +66,86 @@ impl Interpreter {
     }
 
     /// Runs the program to its next event. Returns after at most one iteration of a loop or one call of a function. Returns
-    /// [`Event::Over`] again and again after the end.
+    /// [`ProgramEvent::Over`] again and again after the end.
     ///
     /// # Errors
     /// A number is out of range or not finite, or too many calls are open. The error names the block.
-    pub fn advance(&mut self) -> Result<Event, ProgramError> {
+    pub fn advance(&mut self) -> Result<ProgramEvent, ProgramError> {
         while let Some((step, block)) = self.code.instructions.get(self.next).cloned() {
             self.next += 1;
             if let Some(event) = self.step(step, &block).map_err(|fault| fault.at(&block))? {
                 return Ok(event);
             }
         }
-        Ok(Event::Over)
+        Ok(ProgramEvent::Over)
     }
 
-    /// Supplies the value of the sensor that the last [`Event::Sensor`] asked for.
+    /// Supplies the value of the sensor that the last [`ProgramEvent::Sensor`] asked for.
     pub fn answer(&mut self, value: Value) {
         self.stack.push(value);
     }
 
-    fn step(&mut self, step: Step, block: &BlockId) -> Result<Option<Event>, ProgramFault> {
+    fn step(
+        &mut self,
+        step: MachineInstruction,
+        block: &BlockId,
+    ) -> Result<Option<ProgramEvent>, ProgramFault> {
         match step {
-            Step::Begin => return Ok(Some(Event::Begin(block.clone()))),
-            Step::Sense(sensor) => return Ok(Some(Event::Sensor(sensor))),
-            Step::Act(act) => return Ok(Some(Event::Command(self.command(act)?))),
-            Step::End => {
+            MachineInstruction::Begin => return Ok(Some(ProgramEvent::Begin(block.clone()))),
+            MachineInstruction::Sense(sensor) => return Ok(Some(ProgramEvent::Sensor(sensor))),
+            MachineInstruction::Act(act) => return Ok(Some(ProgramEvent::Command(self.command(act)?))),
+            MachineInstruction::End => {
                 self.next = self.code.instructions.len();
-                return Ok(Some(Event::Over));
+                return Ok(Some(ProgramEvent::Over));
             }
-            Step::Push(value) => self.stack.push(value),
-            Step::Load(variable) => {
+            MachineInstruction::Push(value) => self.stack.push(value),
+            MachineInstruction::Load(variable) => {
                 let value = self.variable(variable).map_or(Value::Number(0.0), |value| *value);
                 self.stack.push(value);
             }
-            Step::Store(variable) => {
+            MachineInstruction::Store(variable) => {
                 let value = self.pop();
                 if let Some(place) = self.variable(variable) {
                     *place = value;
                 }
             }
-            Step::Calculate(operation) => {
+            MachineInstruction::Calculate(operation) => {
                 let (other, one) = (self.pop(), self.pop());
                 self.stack.push(one.calculate(operation, other)?);
             }
-            Step::Compare(comparison) => {
+            MachineInstruction::Compare(comparison) => {
                 let (other, one) = (self.pop(), self.pop());
                 self.stack.push(one.compare(comparison, other));
             }
-            Step::Not => {
+            MachineInstruction::Not => {
                 let value = Value::Truth(!self.pop().truth());
                 self.stack.push(value);
             }
-            Step::Pop => drop(self.pop()),
+            MachineInstruction::Pop => drop(self.pop()),
             _ => self.flow(step)?,
         }
         Ok(None)
     }
 
     /// Carries out the steps that change the order of the instructions: jumps, loops, calls and returns.
-    fn flow(&mut self, step: Step) -> Result<(), ProgramFault> {
+    fn flow(&mut self, step: MachineInstruction) -> Result<(), ProgramFault> {
         match step {
-            Step::Jump(to) => self.next = to,
-            Step::JumpIfFalse(to) => self.next = if self.pop().truth() { self.next } else { to },
-            Step::JumpKeepingIf { truth, to } => {
+            MachineInstruction::Jump(to) => self.next = to,
+            MachineInstruction::JumpIfFalse(to) => {
+                self.next = if self.pop().truth() { self.next } else { to }
+            }
+            MachineInstruction::JumpKeepingIf { truth, to } => {
                 if self.stack.last().is_some_and(|value| value.truth() == truth) {
                     self.next = to;
                 } else {
                     self.pop();
                 }
             }
-            Step::Count => {
+            MachineInstruction::Count => {
                 let rounds = self.pop().number().trunc().max(0.0);
                 self.stack.push(Value::Number(rounds));
             }
-            Step::NextRound(to) => {
+            MachineInstruction::NextRound(to) => {
                 let rounds = self.pop().number();
                 if rounds > 0.0 {
                     self.stack.push(Value::Number(rounds - 1.0));
@@ -147,8 +153,8 @@ impl Interpreter {
                     self.next = to;
                 }
             }
-            Step::Call { function, arguments } => self.call(function, arguments)?,
-            Step::Return => {
+            MachineInstruction::Call { function, arguments } => self.call(function, arguments)?,
+            MachineInstruction::Return => {
                 let value = self.pop();
                 if let Some(call) = self.calls.pop() {
                     self.stack.truncate(call.base);
@@ -195,7 +201,7 @@ impl Interpreter {
         numbers
     }
 
-    fn command(&mut self, act: Act) -> Result<Command, ProgramFault> {
+    fn command(&mut self, act: Act) -> Result<ProgramCommand, ProgramFault> {
         Ok(match act {
             Act::MoveJoint(joint) => {
                 let [degrees, speed] = self.numbers();
@@ -203,7 +209,7 @@ impl Interpreter {
                 if let Some(target) = targets.get_mut(usize::from(joint.index())) {
                     *target = Some(angle(degrees)?);
                 }
-                Command::Joints { targets, pace: joint_pace(speed)? }
+                ProgramCommand::Joints { targets, pace: joint_pace(speed)? }
             }
             Act::Pose => {
                 let [one, two, three, four, five, six, seven, seconds] = self.numbers();
@@ -211,24 +217,32 @@ impl Interpreter {
                 for (target, degrees) in targets.iter_mut().zip([one, two, three, four, five, six, seven]) {
                     *target = Some(angle(degrees)?);
                 }
-                Command::Joints { targets, pace: timed_pace(seconds)? }
+                ProgramCommand::Joints { targets, pace: timed_pace(seconds)? }
             }
             Act::MoveTip(tool) => {
                 let [x, y, z, speed] = self.numbers();
-                Command::Tip { tip: Vector::new(x, y, z), tool: tool.vector(), pace: joint_pace(speed)? }
+                ProgramCommand::Tip {
+                    tip: Vector::new(x, y, z),
+                    tool: tool.vector(),
+                    pace: joint_pace(speed)?,
+                }
             }
             Act::Line(tool) => {
                 let [x, y, z, speed] = self.numbers();
-                Command::Line { tip: Vector::new(x, y, z), tool: tool.vector(), speed: line_speed(speed)? }
+                ProgramCommand::Line {
+                    tip: Vector::new(x, y, z),
+                    tool: tool.vector(),
+                    speed: line_speed(speed)?,
+                }
             }
             Act::Grip(is_open) => {
                 let [open, closed] = CLAW;
-                Command::Grip { claw: angle(if is_open { open } else { closed })? }
+                ProgramCommand::Grip { claw: angle(if is_open { open } else { closed })? }
             }
-            Act::Vacuum(is_on) => Command::Vacuum(is_on),
+            Act::Vacuum(is_on) => ProgramCommand::Vacuum(is_on),
             Act::Wait => {
                 let [seconds] = self.numbers();
-                Command::Wait(wait(seconds)?)
+                ProgramCommand::Wait(wait(seconds)?)
             }
         })
     }

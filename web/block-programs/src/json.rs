@@ -15,7 +15,7 @@ use crate::fault::{BlockId, ProgramError, ProgramFault};
 const LARGEST: usize = 200_000;
 
 #[derive(Deserialize)]
-pub(crate) struct Workspace<'a> {
+pub(crate) struct BlocklyWorkspace<'a> {
     #[serde(borrow, default)]
     blocks: TopBlocks<'a>,
     #[serde(default)]
@@ -36,7 +36,7 @@ pub(crate) struct VariableModel {
 
 /// A block. The blocks in its inputs and below it are not parsed yet.
 #[derive(Deserialize)]
-pub(crate) struct Block<'a> {
+pub(crate) struct BlocklyBlock<'a> {
     #[serde(rename = "type")]
     pub(crate) kind: String,
     #[serde(default = "no_id")]
@@ -44,9 +44,9 @@ pub(crate) struct Block<'a> {
     #[serde(default)]
     fields: BTreeMap<String, Value>,
     #[serde(borrow, default)]
-    inputs: BTreeMap<String, Connection<'a>>,
+    inputs: BTreeMap<String, BlockConnection<'a>>,
     #[serde(borrow, default)]
-    next: Option<Connection<'a>>,
+    next: Option<BlockConnection<'a>>,
     /// The state of a block with a variable shape, such as the number of its branches or the parameters of its function.
     #[serde(default, rename = "extraState")]
     pub(crate) extra: Value,
@@ -71,21 +71,21 @@ fn no_id() -> BlockText {
 }
 
 #[derive(Deserialize)]
-struct Connection<'a> {
+struct BlockConnection<'a> {
     #[serde(borrow)]
     block: Option<&'a RawValue>,
     #[serde(borrow)]
     shadow: Option<&'a RawValue>,
 }
 
-impl<'a> Connection<'a> {
+impl<'a> BlockConnection<'a> {
     /// The connected block, or else the shadow block: Blockly's default value of an input.
-    fn block(&self) -> Result<Option<Block<'a>>, ProgramError> {
+    fn block(&self) -> Result<Option<BlocklyBlock<'a>>, ProgramError> {
         self.block.or(self.shadow).map(block).transpose()
     }
 }
 
-fn block(text: &RawValue) -> Result<Block<'_>, ProgramError> {
+fn block(text: &RawValue) -> Result<BlocklyBlock<'_>, ProgramError> {
     serde_json::from_str(text.get()).map_err(no_workspace)
 }
 
@@ -94,7 +94,7 @@ fn no_workspace(error: serde_json::Error) -> ProgramError {
     ProgramFault::NotAWorkspace(error.to_string()).of_workspace()
 }
 
-impl<'a> Workspace<'a> {
+impl<'a> BlocklyWorkspace<'a> {
     pub(crate) fn of(text: &'a str) -> Result<Self, ProgramError> {
         if text.len() > LARGEST {
             return Err(ProgramFault::TooLarge.of_workspace());
@@ -103,12 +103,12 @@ impl<'a> Workspace<'a> {
     }
 
     /// The blocks that no other block contains.
-    pub(crate) fn top_blocks(&self) -> Result<Vec<Block<'a>>, ProgramError> {
+    pub(crate) fn top_blocks(&self) -> Result<Vec<BlocklyBlock<'a>>, ProgramError> {
         self.blocks.blocks.iter().map(|&text| block(text)).collect()
     }
 }
 
-impl<'a> Block<'a> {
+impl<'a> BlocklyBlock<'a> {
     pub(crate) fn fault(&self, fault: ProgramFault) -> ProgramError {
         fault.at(&self.id.0)
     }
@@ -118,14 +118,14 @@ impl<'a> Block<'a> {
     }
 
     /// The block in an input; `None` if the input is empty or its block is disabled.
-    pub(crate) fn input(&self, name: &str) -> Result<Option<Block<'a>>, ProgramError> {
-        let block = self.inputs.get(name).map(Connection::block).transpose()?.flatten();
-        Ok(block.filter(Block::is_enabled))
+    pub(crate) fn input(&self, name: &str) -> Result<Option<BlocklyBlock<'a>>, ProgramError> {
+        let block = self.inputs.get(name).map(BlockConnection::block).transpose()?.flatten();
+        Ok(block.filter(BlocklyBlock::is_enabled))
     }
 
     /// The block below this one, also if it is disabled.
-    pub(crate) fn next(&self) -> Result<Option<Block<'a>>, ProgramError> {
-        Ok(self.next.as_ref().map(Connection::block).transpose()?.flatten())
+    pub(crate) fn next(&self) -> Result<Option<BlocklyBlock<'a>>, ProgramError> {
+        Ok(self.next.as_ref().map(BlockConnection::block).transpose()?.flatten())
     }
 
     /// The value of a field that holds a text.

@@ -3,7 +3,7 @@
 //! ```text
 //!   JSON of Blockly's workspace ──▶ Program ──▶ python: the same program for the package `sevenbot`
 //!                                      │
-//!                                      └──▶ Code ──▶ Interpreter ──▶ Event: a block begins, a command, a sensor
+//!                                      └──▶ Code ──▶ Interpreter ──▶ ProgramEvent: a block begins, a command, a sensor
 //!                                                        ▲                                    │
 //!                                                        └──────────── value of the sensor ───┘
 //! ```
@@ -25,9 +25,9 @@ mod program;
 mod python;
 mod value;
 
-pub use command::{Axis, Command, LINE_SPEEDS, Sensor};
+pub use command::{Axis, LINE_SPEEDS, ProgramCommand, Sensor};
 pub use fault::{BlockId, ProgramError, ProgramFault, Quantity};
-pub use interpreter::{Event, Interpreter, MOST_CALLS};
+pub use interpreter::{Interpreter, MOST_CALLS, ProgramEvent};
 pub use program::Program;
 pub use python::python;
 pub use value::Value;

@@ -4,11 +4,12 @@ use std::collections::HashMap;
 
 use sevenbot::Joint;
 
-use crate::command::{Axis, Sensor, Tool};
+use crate::command::{Axis, NamedDirection, Sensor};
 use crate::fault::{ProgramError, ProgramFault};
-use crate::json::{Block, Workspace};
+use crate::json::{BlocklyBlock, BlocklyWorkspace};
 use crate::program::{
-    Arithmetic, Comparison, Expression, ExpressionKind, Function, Program, Statement, StatementKind, Variable,
+    Arithmetic, Comparison, Expression, ExpressionKind, Program, Statement, StatementKind, UserFunction,
+    Variable,
 };
 
 /// The kind of the block that starts a program.
@@ -20,12 +21,12 @@ const GIVES_VALUE: &str = "procedures_defreturn";
 const DEEPEST: usize = 60;
 
 const AXES: [(&str, Axis); 3] = [("X", Axis::X), ("Y", Axis::Y), ("Z", Axis::Z)];
-const TOOLS: [(&str, Tool); 5] = [
-    ("DOWN", Tool::Down),
-    ("FORWARD", Tool::Forward),
-    ("LEFT", Tool::Left),
-    ("RIGHT", Tool::Right),
-    ("UP", Tool::Up),
+const DIRECTIONS: [(&str, NamedDirection); 5] = [
+    ("DOWN", NamedDirection::Down),
+    ("FORWARD", NamedDirection::Forward),
+    ("LEFT", NamedDirection::Left),
+    ("RIGHT", NamedDirection::Right),
+    ("UP", NamedDirection::Up),
 ];
 const ARITHMETIC: [(&str, Arithmetic); 5] = [
     ("ADD", Arithmetic::Add),
@@ -55,14 +56,14 @@ impl Program {
 
 /// Parses a workspace. Ignores disabled blocks, and blocks that are neither below the start block nor part of a function.
 fn program(text: &str) -> Result<Program, ProgramError> {
-    let workspace = Workspace::of(text)?;
-    let blocks: Vec<_> = workspace.top_blocks()?.into_iter().filter(Block::is_enabled).collect();
+    let workspace = BlocklyWorkspace::of(text)?;
+    let blocks: Vec<_> = workspace.top_blocks()?.into_iter().filter(BlocklyBlock::is_enabled).collect();
     let mut starts = blocks.iter().filter(|block| block.kind == START);
     let start = starts.next().ok_or_else(|| ProgramFault::NoStart.of_workspace())?;
     if let Some(second) = starts.next() {
         return Err(second.fault(ProgramFault::SeveralStarts));
     }
-    let is_function = |block: &&Block<'_>| FUNCTIONS.contains(&block.kind.as_str());
+    let is_function = |block: &&BlocklyBlock<'_>| FUNCTIONS.contains(&block.kind.as_str());
     let functions: Vec<_> = blocks.iter().filter(is_function).collect();
     let mut names = HashMap::new();
     for (number, block) in functions.iter().enumerate() {
@@ -92,7 +93,7 @@ enum FunctionKind {
 }
 
 impl FunctionKind {
-    fn of(block: &Block<'_>) -> Self {
+    fn of(block: &BlocklyBlock<'_>) -> Self {
         if block.kind == GIVES_VALUE { Self::WithValue } else { Self::WithoutValue }
     }
 }
@@ -115,14 +116,14 @@ impl Scope<'_> {
     ///
     /// # Errors
     /// The block is nested too deeply.
-    fn within(&self, block: &Block<'_>) -> Result<Self, ProgramError> {
+    fn within(&self, block: &BlocklyBlock<'_>) -> Result<Self, ProgramError> {
         if self.depth >= DEEPEST {
             return Err(block.fault(ProgramFault::TooDeep));
         }
         Ok(Self { depth: self.depth + 1, ..self.clone() })
     }
 
-    fn function(&self, block: &Block<'_>) -> Result<Function, ProgramError> {
+    fn function(&self, block: &BlocklyBlock<'_>) -> Result<UserFunction, ProgramError> {
         let kind = FunctionKind::of(block);
         let mut scope = Self { function: Some(kind), ..self.within(block)? };
         let mut hidden = Vec::new();
@@ -134,7 +135,7 @@ impl Scope<'_> {
             hidden.push(*number);
         }
         let result = (kind == FunctionKind::WithValue).then(|| scope.input(block, "RETURN")).transpose()?;
-        Ok(Function {
+        Ok(UserFunction {
             block: block.id.0.clone(),
             name: block.text("NAME")?.to_owned(),
             parameters: hidden,
@@ -144,7 +145,7 @@ impl Scope<'_> {
     }
 
     /// Parses a block and all blocks below it. Skips disabled blocks.
-    fn statements(&self, first: Option<Block<'_>>) -> Result<Vec<Statement>, ProgramError> {
+    fn statements(&self, first: Option<BlocklyBlock<'_>>) -> Result<Vec<Statement>, ProgramError> {
         let (mut statements, mut next) = (Vec::new(), first);
         while let Some(block) = next {
             if block.is_enabled() {
@@ -155,7 +156,7 @@ impl Scope<'_> {
         Ok(statements)
     }
 
-    fn statement(&self, block: &Block<'_>) -> Result<StatementKind, ProgramError> {
+    fn statement(&self, block: &BlocklyBlock<'_>) -> Result<StatementKind, ProgramError> {
         let input = |name| self.input(block, name);
         Ok(match block.kind.as_str() {
             "arm_move_joint" => StatementKind::MoveJoint {
@@ -166,12 +167,12 @@ impl Scope<'_> {
             "arm_pose" => StatementKind::Pose { angles: pose(block)?, seconds: block.number("SECONDS")? },
             "arm_move_tip" => StatementKind::MoveTip {
                 to: self.point(block)?,
-                tool: block.choice("TOOL", &TOOLS)?,
+                tool: block.choice("TOOL", &DIRECTIONS)?,
                 speed: input("SPEED")?,
             },
             "arm_line" => StatementKind::Line {
                 to: self.point(block)?,
-                tool: block.choice("TOOL", &TOOLS)?,
+                tool: block.choice("TOOL", &DIRECTIONS)?,
                 speed: input("SPEED")?,
             },
             "arm_grip" => StatementKind::Grip(block.choice("STATE", &[("OPEN", true), ("CLOSE", false)])?),
@@ -188,7 +189,7 @@ impl Scope<'_> {
     }
 
     /// Parses a block that changes the order of the blocks: a loop, a branch, a break or a return.
-    fn flow(&self, block: &Block<'_>) -> Result<StatementKind, ProgramError> {
+    fn flow(&self, block: &BlocklyBlock<'_>) -> Result<StatementKind, ProgramError> {
         Ok(match block.kind.as_str() {
             "controls_repeat_ext" => {
                 StatementKind::Repeat { times: self.input(block, "TIMES")?, body: self.repeated(block)? }
@@ -217,12 +218,12 @@ impl Scope<'_> {
         })
     }
 
-    fn repeated(&self, block: &Block<'_>) -> Result<Vec<Statement>, ProgramError> {
+    fn repeated(&self, block: &BlocklyBlock<'_>) -> Result<Vec<Statement>, ProgramError> {
         let scope = Self { loops: self.loops + 1, ..self.within(block)? };
         scope.statements(block.input("DO")?)
     }
 
-    fn branches(&self, block: &Block<'_>) -> Result<StatementKind, ProgramError> {
+    fn branches(&self, block: &BlocklyBlock<'_>) -> Result<StatementKind, ProgramError> {
         let scope = self.within(block)?;
         let more = block.extra.get("elseIfCount").and_then(serde_json::Value::as_u64).unwrap_or(0);
         let branch = |number: u64| {
@@ -235,7 +236,7 @@ impl Scope<'_> {
         })
     }
 
-    fn expression(&self, block: &Block<'_>) -> Result<Expression, ProgramError> {
+    fn expression(&self, block: &BlocklyBlock<'_>) -> Result<Expression, ProgramError> {
         let pair = |one, other| {
             Ok::<_, ProgramError>(Box::new([self.input(block, one)?, self.input(block, other)?]))
         };
@@ -262,7 +263,7 @@ impl Scope<'_> {
         Ok(Expression { block: block.id.0.clone(), kind })
     }
 
-    fn call(&self, block: &Block<'_>) -> Result<(usize, Vec<Expression>), ProgramError> {
+    fn call(&self, block: &BlocklyBlock<'_>) -> Result<(usize, Vec<Expression>), ProgramError> {
         let name = block.extra.get("name").and_then(serde_json::Value::as_str).unwrap_or_default();
         let unknown = || block.fault(ProgramFault::UnknownFunction(name.to_owned()));
         let function = self.functions.get(name).ok_or_else(unknown)?;
@@ -270,24 +271,24 @@ impl Scope<'_> {
         Ok((function.number, (0..function.parameters).map(argument).collect::<Result<_, _>>()?))
     }
 
-    fn point(&self, block: &Block<'_>) -> Result<[Expression; 3], ProgramError> {
+    fn point(&self, block: &BlocklyBlock<'_>) -> Result<[Expression; 3], ProgramError> {
         Ok([self.input(block, "X")?, self.input(block, "Y")?, self.input(block, "Z")?])
     }
 
     /// Parses the expression in an input. An empty input is an error.
-    fn input(&self, block: &Block<'_>, name: &str) -> Result<Expression, ProgramError> {
+    fn input(&self, block: &BlocklyBlock<'_>, name: &str) -> Result<Expression, ProgramError> {
         let inner =
             block.input(name)?.ok_or_else(|| block.fault(ProgramFault::EmptyInput(name.to_owned())))?;
         self.within(&inner)?.expression(&inner)
     }
 
-    fn variable(&self, block: &Block<'_>) -> Result<Variable, ProgramError> {
+    fn variable(&self, block: &BlocklyBlock<'_>) -> Result<Variable, ProgramError> {
         self.variables.get(block.variable("VAR")?).copied().ok_or_else(|| block.bad_field("VAR"))
     }
 }
 
 /// The identifiers of a function's parameters.
-fn parameters<'a>(block: &'a Block<'_>) -> Result<Vec<&'a str>, ProgramError> {
+fn parameters<'a>(block: &'a BlocklyBlock<'_>) -> Result<Vec<&'a str>, ProgramError> {
     let list = block.extra.get("params").and_then(serde_json::Value::as_array).into_iter().flatten();
     let id = |parameter: &'a serde_json::Value| parameter.get("id").and_then(serde_json::Value::as_str);
     list.map(|parameter| id(parameter).ok_or_else(|| block.bad_field("params"))).collect()
@@ -297,7 +298,7 @@ fn negated(condition: Expression) -> Expression {
     Expression { block: condition.block.clone(), kind: ExpressionKind::Not(Box::new(condition)) }
 }
 
-fn sensor(block: &Block<'_>) -> Result<Sensor, ProgramError> {
+fn sensor(block: &BlocklyBlock<'_>) -> Result<Sensor, ProgramError> {
     Ok(match block.kind.as_str() {
         "arm_angle" => Sensor::Angle(joint(block)?),
         "arm_tip" => Sensor::Tip(block.choice("AXIS", &AXES)?),
@@ -308,12 +309,12 @@ fn sensor(block: &Block<'_>) -> Result<Sensor, ProgramError> {
     })
 }
 
-fn joint(block: &Block<'_>) -> Result<Joint, ProgramError> {
+fn joint(block: &BlocklyBlock<'_>) -> Result<Joint, ProgramError> {
     let number = block.text("JOINT")?.parse().ok();
     number.and_then(Joint::new).ok_or_else(|| block.bad_field("JOINT"))
 }
 
-fn pose(block: &Block<'_>) -> Result<[f64; 7], ProgramError> {
+fn pose(block: &BlocklyBlock<'_>) -> Result<[f64; 7], ProgramError> {
     let mut angles = [0.0; 7];
     for (number, angle) in (1..).zip(&mut angles) {
         *angle = block.number(&format!("J{number}"))?;

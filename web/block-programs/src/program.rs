@@ -2,7 +2,7 @@
 
 use sevenbot::Joint;
 
-use crate::command::{Axis, Sensor, Tool};
+use crate::command::{Axis, NamedDirection, Sensor};
 use crate::fault::BlockId;
 
 /// A parsed program. [`Interpreter`](crate::Interpreter) runs it, and [`python`](crate::python()) writes it as Python.
@@ -10,12 +10,12 @@ use crate::fault::BlockId;
 pub struct Program {
     /// The names of the variables, as the user typed them.
     pub(crate) variables: Vec<String>,
-    pub(crate) functions: Vec<Function>,
+    pub(crate) functions: Vec<UserFunction>,
     pub(crate) body: Vec<Statement>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Function {
+pub(crate) struct UserFunction {
     pub(crate) block: BlockId,
     pub(crate) name: String,
     /// The indices of the variables that its parameters hide: Blockly makes a variable for each parameter.
@@ -44,12 +44,12 @@ pub(crate) enum StatementKind {
     },
     MoveTip {
         to: [Expression; 3],
-        tool: Tool,
+        tool: NamedDirection,
         speed: Expression,
     },
     Line {
         to: [Expression; 3],
-        tool: Tool,
+        tool: NamedDirection,
         speed: Expression,
     },
     /// True opens the gripper.

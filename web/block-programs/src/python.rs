@@ -6,10 +6,11 @@ use std::fmt::Write;
 
 use sevenbot::Joint;
 
-use crate::command::{Axis, CLAW, Sensor, Tool};
+use crate::command::{Axis, CLAW, NamedDirection, Sensor};
 use crate::names::Names;
 use crate::program::{
-    Arithmetic, Comparison, Expression, ExpressionKind, Function, Program, Statement, StatementKind, Variable,
+    Arithmetic, Comparison, Expression, ExpressionKind, Program, Statement, StatementKind, UserFunction,
+    Variable,
 };
 
 /// The precedence of Python's operators: a higher one binds tighter. `WHOLE` never needs brackets.
@@ -74,7 +75,7 @@ struct Writer<'a> {
 }
 
 impl Writer<'_> {
-    fn function(&self, text: &mut String, function: &Function, name: &str) {
+    fn function(&self, text: &mut String, function: &UserFunction, name: &str) {
         text.push_str("\n\n");
         line(text, 0, &format!("def {name}({}):", self.names(self.parameters).join(", ")));
         let mut set = BTreeSet::new();
@@ -163,10 +164,16 @@ impl Writer<'_> {
         }
     }
 
-    fn move_to(&self, to: &[Expression; 3], tool: Tool, straight: &str, speed: &Expression) -> String {
+    fn move_to(
+        &self,
+        to: &[Expression; 3],
+        tool: NamedDirection,
+        straight: &str,
+        speed: &Expression,
+    ) -> String {
         let [x, y, z] = [&to[0], &to[1], &to[2]].map(|part| self.plain(part));
         let tool = match tool {
-            Tool::Down => String::new(),
+            NamedDirection::Down => String::new(),
             other => format!("tool=({}), ", other.direction().map(|part| part.to_string()).join(", ")),
         };
         format!("arm.move_to({x}, {y}, {z}, {tool}{straight}speed={})", self.plain(speed))

@@ -9,7 +9,7 @@ const AT_REST: f64 = 0.5;
 
 /// The state of the arm and of the things on the table at one instant.
 #[derive(Clone, Debug, Default)]
-pub struct Observation {
+pub struct Situation {
     /// The time in seconds, from any fixed instant.
     pub seconds: f64,
     /// The tip: x, y, z in mm; `None` if one of joints 1 to 6 is not measured.
@@ -34,7 +34,7 @@ pub struct SeenThing {
 }
 
 #[derive(Clone, Debug)]
-enum Progress {
+enum GoalProgress {
     Reached,
     Open,
     Along(PathProgress),
@@ -45,19 +45,19 @@ enum Progress {
 /// The goals of an exercise, and which of them the learner has reached.
 ///
 /// ```
-/// use exercises::{Attempt, Exercise, Observation};
+/// use exercises::{Attempt, Exercise, Situation};
 ///
 /// let text = r#"{"title": "Touch", "text": "Touch it.", "goals": [{"text": "the point", "tip": [0, 200, 50]}]}"#;
 /// let mut attempt = Attempt::new(&Exercise::parse(text)?);
-/// attempt.observe(&Observation { tip: Some([0.0, 203.0, 50.0]), ..Observation::default() });
+/// attempt.observe(&Situation { tip: Some([0.0, 203.0, 50.0]), ..Situation::default() });
 /// assert!(attempt.is_solved());
 /// # Ok::<(), exercises::ExerciseError>(())
 /// ```
 #[derive(Clone, Debug)]
 pub struct Attempt {
-    goals: Vec<(Goal, Progress)>,
+    goals: Vec<(Goal, GoalProgress)>,
     in_order: bool,
-    /// The times of the first and the last observation, in seconds.
+    /// The times of the first and the last situation, in seconds.
     seconds: Option<(f64, f64)>,
 }
 
@@ -66,27 +66,27 @@ impl Attempt {
     #[must_use]
     pub fn new(exercise: &Exercise) -> Self {
         let progress = |goal: &Goal| match goal {
-            Goal::Path { path, within, .. } => Progress::Along(PathProgress::new(path, *within)),
-            _ => Progress::Open,
+            Goal::Path { path, within, .. } => GoalProgress::Along(PathProgress::new(path, *within)),
+            _ => GoalProgress::Open,
         };
         let goals = exercise.goals.iter().map(|goal| (goal.clone(), progress(goal))).collect();
         Self { goals, in_order: exercise.in_order, seconds: None }
     }
 
-    /// Checks the open goals against an observation. Returns true if at least one of them is reached now. Has no effect after the
-    /// exercise is solved.
-    pub fn observe(&mut self, seen: &Observation) -> bool {
+    /// Checks the open goals against a situation; goals in order only up to the first that is not reached. Returns true if at
+    /// least one of them is reached now. Has no effect after the exercise is solved.
+    pub fn observe(&mut self, seen: &Situation) -> bool {
         if self.is_solved() {
             return false;
         }
         self.seconds = Some((self.seconds.map_or(seen.seconds, |(start, _)| start), seen.seconds));
         let mut is_any_reached = false;
         for (goal, progress) in &mut self.goals {
-            if matches!(progress, Progress::Reached) {
+            if matches!(progress, GoalProgress::Reached) {
                 continue;
             }
             if is_reached(goal, progress, seen) {
-                *progress = Progress::Reached;
+                *progress = GoalProgress::Reached;
                 is_any_reached = true;
             } else if self.in_order {
                 break;
@@ -97,7 +97,7 @@ impl Attempt {
 
     /// Whether each goal is reached, in the order of the exercise.
     pub fn reached(&self) -> impl Iterator<Item = bool> {
-        self.goals.iter().map(|(_, progress)| matches!(progress, Progress::Reached))
+        self.goals.iter().map(|(_, progress)| matches!(progress, GoalProgress::Reached))
     }
 
     /// Are all goals reached?
@@ -106,18 +106,18 @@ impl Attempt {
         self.reached().all(|is_reached| is_reached)
     }
 
-    /// The time from the first observation to the last one, in seconds. The observation that solves the exercise is the last one.
+    /// The time from the first situation to the last one, in seconds. The situation that solves the exercise is the last one.
     #[must_use]
     pub fn duration(&self) -> f64 {
         self.seconds.map_or(0.0, |(start, end)| end - start)
     }
 }
 
-fn is_reached(goal: &Goal, progress: &mut Progress, seen: &Observation) -> bool {
+fn is_reached(goal: &Goal, progress: &mut GoalProgress, seen: &Situation) -> bool {
     match goal {
         Goal::Tip { tip, within, .. } => seen.tip.is_some_and(|at| distance(at, *tip) <= *within),
         Goal::Path { .. } => match progress {
-            Progress::Along(path) => path.observe(seen.tip),
+            GoalProgress::Along(path) => path.observe(seen.tip),
             _ => false,
         },
         Goal::Joint { joint, degrees, within, .. } => {
@@ -136,13 +136,13 @@ fn is_reached(goal: &Goal, progress: &mut Progress, seen: &Observation) -> bool 
 
 /// Updates the progress of a goal for a joint or a thing. Returns true if the joint or thing has been in place for at least
 /// [`AT_REST`].
-fn rests(progress: &mut Progress, seconds: f64, is_there: bool) -> bool {
+fn rests(progress: &mut GoalProgress, seconds: f64, is_there: bool) -> bool {
     if !is_there {
-        *progress = Progress::Open;
-    } else if !matches!(progress, Progress::There(_)) {
-        *progress = Progress::There(seconds);
+        *progress = GoalProgress::Open;
+    } else if !matches!(progress, GoalProgress::There(_)) {
+        *progress = GoalProgress::There(seconds);
     }
-    matches!(progress, Progress::There(since) if seconds - *since >= AT_REST)
+    matches!(progress, GoalProgress::There(since) if seconds - *since >= AT_REST)
 }
 
 #[cfg(test)]
@@ -154,9 +154,9 @@ mod tests {
         Attempt::new(&Exercise::parse(&text).unwrap_or_else(|error| panic!("{error}")))
     }
 
-    fn seen(seconds: f64, joint_1: f64) -> Observation {
+    fn seen(seconds: f64, joint_1: f64) -> Situation {
         let joints = [Some(joint_1), None, None, None, None, None, None];
-        Observation { seconds, joints, ..Observation::default() }
+        Situation { seconds, joints, ..Situation::default() }
     }
 
     #[test]
@@ -174,10 +174,10 @@ mod tests {
     #[test]
     fn a_thing_that_is_carried_over_its_place_is_not_there() {
         let mut attempt = attempt(r#"{"text": "t", "thing": "red", "at": [80, 200, -45]}"#, "");
-        let seen = |seconds, name: &str, x, is_carried| Observation {
+        let seen = |seconds, name: &str, x, is_carried| Situation {
             seconds,
             things: vec![SeenThing { name: name.to_owned(), at: [x, 200.0, -45.0], is_carried }],
-            ..Observation::default()
+            ..Situation::default()
         };
         for (seconds, name, x, is_carried) in [
             (0.0, "red", 80.0, true),
@@ -195,8 +195,8 @@ mod tests {
     #[test]
     fn goals_in_order_wait_for_those_before_them() {
         let goals = r#"{"text": "a", "tip": [0, 200, 50]}, {"text": "b", "blocked": 2}"#;
-        let at_b = Observation { blocked: 0b10, ..Observation::default() };
-        let at_a = Observation { tip: Some([0.0, 200.0, 50.0]), ..Observation::default() };
+        let at_b = Situation { blocked: 0b10, ..Situation::default() };
+        let at_a = Situation { tip: Some([0.0, 200.0, 50.0]), ..Situation::default() };
         let mut ordered = attempt(goals, r#", "in_order": true"#);
         assert!(!ordered.observe(&at_b) && ordered.observe(&at_a) && ordered.observe(&at_b));
         assert!(ordered.is_solved());

@@ -3,7 +3,7 @@
 use serde::Deserialize;
 
 use crate::goal::Goal;
-use crate::solution::{SolutionPart, Step, parts};
+use crate::solution::{SolutionPart, SolutionStep, parts};
 use crate::text::Text;
 
 /// The largest file of an exercise, in bytes.
@@ -39,7 +39,7 @@ pub struct Exercise {
     pub setup: Vec<String>,
     /// The steps of a solution; empty if the file has none.
     #[serde(default)]
-    solution: Vec<Step>,
+    solution: Vec<SolutionStep>,
 }
 
 /// The reason why a text is no valid exercise.
@@ -66,8 +66,8 @@ impl Exercise {
     /// Parses the file of an exercise.
     ///
     /// # Errors
-    /// The text is longer than 200,000 bytes or no JSON, a member is missing or unknown, there is no goal, or a number of a goal
-    /// is out of its range.
+    /// The text is longer than 200,000 bytes or no JSON, a member is missing, unknown or invalid, there is no goal, or a number
+    /// of a goal is out of its range.
     pub fn parse(text: &str) -> Result<Self, ExerciseError> {
         let whole = |reason: &str| ExerciseError { line: 0, reason: reason.to_owned() };
         if text.len() > LARGEST {

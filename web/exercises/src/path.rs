@@ -9,21 +9,21 @@ const STEP: f64 = 2.0;
 /// observations is unknown, and the tip begins again.
 const MOST_STEPS: u32 = 50;
 
-type Point = [f64; 3];
+type PathPoint = [f64; 3];
 
 /// The progress of a tip along a path. The tip has to pass all checkpoints in order. If it leaves the path, it begins again.
 #[derive(Clone, Debug)]
 pub(crate) struct PathProgress {
-    checkpoints: Vec<Point>,
+    checkpoints: Vec<PathPoint>,
     within: f64,
     /// The number of checkpoints that the tip has passed.
     passed: usize,
-    last: Option<Point>,
+    last: Option<PathPoint>,
 }
 
 impl PathProgress {
-    pub(crate) fn new(path: &[Point], within: f64) -> Self {
-        let mut checkpoints: Vec<Point> = path.first().copied().into_iter().collect();
+    pub(crate) fn new(path: &[PathPoint], within: f64) -> Self {
+        let mut checkpoints: Vec<PathPoint> = path.first().copied().into_iter().collect();
         for (from, to) in path.iter().zip(path.iter().skip(1)) {
             checkpoints.extend(between(*from, *to));
         }
@@ -32,13 +32,13 @@ impl PathProgress {
 
     /// Takes the position of the tip. If it is not measured (`None`), the tip has to begin the path again. Returns true at the
     /// end of the path.
-    pub(crate) fn observe(&mut self, tip: Option<Point>) -> bool {
+    pub(crate) fn observe(&mut self, tip: Option<PathPoint>) -> bool {
         let Some(tip) = tip else {
             self.passed = 0;
             self.last = None;
             return false;
         };
-        let is_near = |from: &Point| distance(*from, tip) <= STEP * f64::from(MOST_STEPS);
+        let is_near = |from: &PathPoint| distance(*from, tip) <= STEP * f64::from(MOST_STEPS);
         let from = self.last.replace(tip).filter(is_near);
         if from.is_none() {
             self.passed = 0;
@@ -46,8 +46,8 @@ impl PathProgress {
         between(from.unwrap_or(tip), tip).into_iter().any(|place| self.passes(place))
     }
 
-    fn passes(&mut self, place: Point) -> bool {
-        let is_near = |point: &Point| distance(*point, place) <= self.within;
+    fn passes(&mut self, place: PathPoint) -> bool {
+        let is_near = |point: &PathPoint| distance(*point, place) <= self.within;
         let ahead = self.checkpoints.iter().skip(self.passed).take_while(|point| is_near(point)).count();
         self.passed += ahead;
         // The tip may cut a corner as long as it is near the last checkpoint that it passed.
@@ -60,13 +60,13 @@ impl PathProgress {
 }
 
 /// Interpolated positions from one point to another, without the first and with the last.
-fn between(from: Point, to: Point) -> Vec<Point> {
+fn between(from: PathPoint, to: PathPoint) -> Vec<PathPoint> {
     let steps =
         (1..MOST_STEPS * 100).find(|steps| distance(from, to) <= STEP * f64::from(*steps)).unwrap_or(1);
     let place = |step| {
         let part = f64::from(step) / f64::from(steps);
         let [x, y, z] = [0, 1, 2].map(|axis| {
-            let [from, to] = [from, to].map(|point: Point| point.get(axis).copied().unwrap_or(0.0));
+            let [from, to] = [from, to].map(|point: PathPoint| point.get(axis).copied().unwrap_or(0.0));
             from + (to - from) * part
         });
         [x, y, z]
@@ -75,7 +75,7 @@ fn between(from: Point, to: Point) -> Vec<Point> {
 }
 
 /// The distance of two points, in mm.
-pub(crate) fn distance(one: Point, other: Point) -> f64 {
+pub(crate) fn distance(one: PathPoint, other: PathPoint) -> f64 {
     one.iter().zip(other).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
 }
 
@@ -83,9 +83,9 @@ pub(crate) fn distance(one: Point, other: Point) -> f64 {
 mod tests {
     use super::*;
 
-    const CORNER: [Point; 3] = [[0.0, 200.0, 50.0], [100.0, 200.0, 50.0], [100.0, 260.0, 50.0]];
+    const CORNER: [PathPoint; 3] = [[0.0, 200.0, 50.0], [100.0, 200.0, 50.0], [100.0, 260.0, 50.0]];
 
-    fn follow(places: &[Point]) -> bool {
+    fn follow(places: &[PathPoint]) -> bool {
         let mut progress = PathProgress::new(&CORNER, 5.0);
         places.iter().any(|place| progress.observe(Some(*place)))
     }

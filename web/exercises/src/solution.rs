@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 
 #[derive(Clone, Debug, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub(crate) enum Step {
+pub(crate) enum SolutionStep {
     /// Moves a joint: its number, 1 to 7, the angle in degrees, the speed in degrees per second.
     Joint(u8, f64, f64),
     /// Moves the tip, with the tool down: x, y, z in mm, the speed of the joints in degrees per second.
@@ -36,19 +36,21 @@ pub enum SolutionPart {
     Repair,
 }
 
-/// Converts steps to programs. Each [`Step::Repair`] ends the program before it.
-pub(crate) fn parts(steps: &[Step]) -> Vec<SolutionPart> {
-    let groups = steps.chunk_by(|one, other| !matches!(one, Step::Repair) && !matches!(other, Step::Repair));
+/// Converts steps to programs. Each [`SolutionStep::Repair`] ends the program before it.
+pub(crate) fn parts(steps: &[SolutionStep]) -> Vec<SolutionPart> {
+    let groups = steps.chunk_by(|one, other| {
+        !matches!(one, SolutionStep::Repair) && !matches!(other, SolutionStep::Repair)
+    });
     groups
         .map(|group| match group {
-            [Step::Repair] => SolutionPart::Repair,
+            [SolutionStep::Repair] => SolutionPart::Repair,
             steps => SolutionPart::Program(workspace(steps)),
         })
         .collect()
 }
 
 /// The JSON of a workspace whose program has these steps. In this JSON each block contains the block below it.
-fn workspace(steps: &[Step]) -> String {
+fn workspace(steps: &[SolutionStep]) -> String {
     let stack = steps.iter().enumerate().rev().fold(None, |next, (number, step)| {
         let mut block = block(step)?;
         add(&mut block, "id", json!(format!("step-{number}")));
@@ -64,7 +66,7 @@ fn workspace(steps: &[Step]) -> String {
     json!({"blocks": {"languageVersion": 0, "blocks": [start]}}).to_string()
 }
 
-fn block(step: &Step) -> Option<Value> {
+fn block(step: &SolutionStep) -> Option<Value> {
     let with = |kind: &str, fields: Value, inputs: &[(&str, f64)]| {
         let inputs: serde_json::Map<_, _> =
             inputs.iter().map(|(name, value)| ((*name).to_owned(), number(*value))).collect();
@@ -72,22 +74,22 @@ fn block(step: &Step) -> Option<Value> {
     };
     let down = || json!({"TOOL": "DOWN"});
     match *step {
-        Step::Joint(joint, degrees, speed) => {
+        SolutionStep::Joint(joint, degrees, speed) => {
             let fields = json!({"JOINT": joint.to_string()});
             with("arm_move_joint", fields, &[("ANGLE", degrees), ("SPEED", speed)])
         }
-        Step::Tip(x, y, z, speed) => {
+        SolutionStep::Tip(x, y, z, speed) => {
             with("arm_move_tip", down(), &[("X", x), ("Y", y), ("Z", z), ("SPEED", speed)])
         }
-        Step::Line(x, y, z, speed) => {
+        SolutionStep::Line(x, y, z, speed) => {
             with("arm_line", down(), &[("X", x), ("Y", y), ("Z", z), ("SPEED", speed)])
         }
-        Step::Grip(claws) => {
+        SolutionStep::Grip(claws) => {
             let state = if matches!(claws, Claws::Open) { "OPEN" } else { "CLOSE" };
             with("arm_grip", json!({"STATE": state}), &[])
         }
-        Step::Wait(seconds) => with("arm_wait", json!({}), &[("SECONDS", seconds)]),
-        Step::Repair => None,
+        SolutionStep::Wait(seconds) => with("arm_wait", json!({}), &[("SECONDS", seconds)]),
+        SolutionStep::Repair => None,
     }
 }
 
@@ -108,8 +110,12 @@ mod tests {
 
     #[test]
     fn steps_become_programs_between_repairs() {
-        let steps =
-            [Step::Joint(1, 120.0, 60.0), Step::Wait(1.0), Step::Repair, Step::Tip(0.0, 200.0, 60.0, 30.0)];
+        let steps = [
+            SolutionStep::Joint(1, 120.0, 60.0),
+            SolutionStep::Wait(1.0),
+            SolutionStep::Repair,
+            SolutionStep::Tip(0.0, 200.0, 60.0, 30.0),
+        ];
         let parts = parts(&steps);
         let [SolutionPart::Program(first), SolutionPart::Repair, SolutionPart::Program(last)] =
             parts.as_slice()

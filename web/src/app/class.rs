@@ -2,7 +2,7 @@
 //! class's real arm while the teacher lends it to this pupil.
 
 use classroom::message::Refusal;
-use classroom::{Goals, LeaseEnd, LentArm, ToPupil};
+use classroom::{ExerciseProgress, LeaseEnd, LentArm, ToPupil};
 use wasm_bindgen::prelude::Closure;
 use wasm_bindgen::{JsCast, JsValue};
 use web_sys::HtmlInputElement;
@@ -10,7 +10,7 @@ use web_sys::HtmlInputElement;
 use super::class_socket::ClassSocket;
 use super::class_tab::ClassTab;
 use super::editor::Editor;
-use super::page::{App, Line, OwnArm, browser_now, with_app};
+use super::page::{App, ArmLine, OwnArm, browser_now, with_app};
 use super::storage;
 use crate::class::{Activity, Membership, report, stop_of_the_real_arm};
 use crate::client::Client;
@@ -225,7 +225,7 @@ impl App {
             _ => Activity::None,
         };
         let count = |number: usize| u8::try_from(number).unwrap_or(u8::MAX);
-        let goals = self.exercises.attempt.as_ref().map(|attempt| Goals {
+        let goals = self.exercises.attempt.as_ref().map(|attempt| ExerciseProgress {
             reached: count(attempt.reached().filter(|&is_reached| is_reached).count()),
             all: count(attempt.reached().count()),
         });
@@ -271,7 +271,7 @@ impl App {
         let Some(query) = self.class.as_ref().and_then(ClassTab::arm_query) else { return };
         let Ok(source) = SocketSource::connect_with(&query) else { return };
         let chosen = self.dom.choice("source");
-        let (line, client) = self.swap_line((Line::Remote(Box::new(source)), Client::default()));
+        let (line, client) = self.swap_line((ArmLine::Remote(Box::new(source)), Client::default()));
         if chosen != "server" || self.set_aside.is_none() {
             self.set_aside = Some(OwnArm { line, client, chosen });
         }
@@ -290,7 +290,7 @@ impl App {
         }
         class.arm_retry = None;
         if let Ok(source) = SocketSource::connect_with(&query) {
-            self.set_line(Line::Remote(Box::new(source)));
+            self.set_line(ArmLine::Remote(Box::new(source)));
         }
     }
 

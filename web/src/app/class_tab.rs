@@ -25,7 +25,8 @@ pub(super) struct ClassTab {
     pub(super) arm_retry: Option<f64>,
     pub(super) code: String,
     pub(super) name: String,
-    /// Who has the class's real arm, according to the last message; `None` if no pupil has it.
+    /// Who has the class's real arm, according to the last message; `None` if no pupil has it, or after the connection was
+    /// lost.
     pub(super) arm: Option<LentArm>,
 }
 

@@ -5,7 +5,7 @@ use wasm_bindgen::JsValue;
 
 use super::dom::set_attribute;
 use super::events::TOUR;
-use super::page::{App, Line};
+use super::page::{App, ArmLine};
 use super::storage;
 use crate::client::Client;
 use crate::source::LineState;
@@ -34,23 +34,23 @@ impl App {
 
     pub(super) fn choose_source(&mut self) {
         let line = match self.dom.choice("source").as_str() {
-            "server" => self.server_arm().map(|source| Line::Remote(Box::new(source))).ok(),
+            "server" => self.server_arm().map(|source| ArmLine::Remote(Box::new(source))).ok(),
             "usb" => {
                 self.close_set_aside_usb();
-                SerialSource::ask().map(|source| Line::Remote(Box::new(source)))
+                SerialSource::ask().map(|source| ArmLine::Remote(Box::new(source)))
             }
-            _ => Some(Line::Simulated(Box::default())),
+            _ => Some(ArmLine::Simulated(Box::default())),
         };
         match line {
             Some(line) => self.set_line(line),
             None if self.class.is_some() => {
                 self.dom.choose("source", "simulator");
-                self.set_line(Line::Simulated(Box::default()));
+                self.set_line(ArmLine::Simulated(Box::default()));
                 self.dom.notice(self.language.text("not-your-arm"));
             }
             None => {
                 self.dom.choose("source", "simulator");
-                self.set_line(Line::Simulated(Box::default()));
+                self.set_line(ArmLine::Simulated(Box::default()));
                 self.dom.notice(self.language.text("no-serial"));
             }
         }
@@ -59,7 +59,7 @@ impl App {
     /// Closes the USB port of an arm that is set aside, because the browser opens no port twice.
     fn close_set_aside_usb(&mut self) {
         if let Some(own) = self.set_aside.as_mut().filter(|own| own.chosen == "usb") {
-            own.line = Line::Simulated(Box::default());
+            own.line = ArmLine::Simulated(Box::default());
             own.client = Client::default();
             own.chosen = "simulator".to_owned();
         }

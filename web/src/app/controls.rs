@@ -9,7 +9,7 @@ use super::dom::number;
 use super::page::App;
 use super::panels::TIP_FIELDS;
 use crate::arm_state::breach_text;
-use crate::scene::{Preset, Refusal, wish};
+use crate::scene::{Preset, WishRefusal, wish};
 
 /// The number of the claw's joint.
 const CLAW: u8 = 7;
@@ -77,8 +77,8 @@ impl App {
         match wish(Vec3::new(x, y, z), self.client.state().targets).reach {
             Ok(angles) => self.go(angles),
             Err(unreachable) => self.refuse_way(match unreachable.why {
-                Refusal::OutOfReach(_) => "unreachable",
-                Refusal::Guarded(breach) => breach_text(&breach),
+                WishRefusal::OutOfReach(_) => "unreachable",
+                WishRefusal::Guarded(breach) => breach_text(&breach),
             }),
         }
     }

@@ -11,11 +11,11 @@ use super::editor::Editor;
 use super::files;
 use super::hand;
 use super::link;
-use super::page::{App, Line, on, on_first};
+use super::page::{App, ArmLine, on, on_first};
 use super::panels::TIP_FIELDS;
 use super::storage;
 use crate::arm_state::target_frame;
-use crate::plots::Quantity;
+use crate::plots::PlottedQuantity;
 use crate::texts::Language;
 
 /// The names of the texts of the tour, in order. The last one is for a real arm.
@@ -144,15 +144,15 @@ impl App {
 
     fn choose_plot(&mut self, value: &str) {
         self.quantity = match value {
-            "velocity" => Quantity::Velocity,
-            "load" => Quantity::Load,
-            _ => Quantity::Angle,
+            "velocity" => PlottedQuantity::Velocity,
+            "load" => PlottedQuantity::Load,
+            _ => PlottedQuantity::Angle,
         };
         self.dom.press("plot", value);
     }
 
     pub(super) fn act_on_simulation(&mut self, action: &str) {
-        if let (Line::Simulated(source), Ok(action)) = (&mut self.line, action.parse()) {
+        if let (ArmLine::Simulated(source), Ok(action)) = (&mut self.line, action.parse()) {
             source.act(action);
         }
     }

@@ -9,8 +9,8 @@ use web_sys::Element;
 
 use super::dom::{Dom, set_attribute, set_text};
 use super::files;
-use super::page::{App, Line};
-use crate::exercise::{observation, set_up};
+use super::page::{App, ArmLine};
+use crate::exercise::{set_up, situation};
 
 impl App {
     /// Carries out the action of a button. Returns false if the action does not belong to exercises.
@@ -69,7 +69,7 @@ impl App {
             (Err(error), _) => {
                 return self.dom.notice(&format!("{} {error}", self.language.text("no-exercise")));
             }
-            (Ok(actions), Line::Simulated(source)) => set_up(source, actions),
+            (Ok(actions), ArmLine::Simulated(source)) => set_up(source, actions),
             (Ok(actions), _) if actions.is_empty() => {}
             _ => return self.dom.notice(self.language.text("exercise-needs-simulation")),
         }
@@ -79,7 +79,7 @@ impl App {
 
     /// Passes the new registers and the things of a simulated arm's room to the attempt. Shows each goal that is reached.
     pub(super) fn observe_exercise(&mut self, now: Instant) {
-        let seen = observation(now, self.client.registers(), self.world());
+        let seen = situation(now, self.client.registers(), self.world());
         let Some(attempt) = &mut self.exercises.attempt else { return };
         if attempt.observe(&seen) {
             self.show_exercise();

@@ -32,7 +32,7 @@ pub fn state() -> String {
 }
 
 /// Projects a point in mm to CSS pixels from the top left of the page's window. `None` if there is no picture of the arm, or if
-/// the point is behind the camera.
+/// the point is behind the camera or less than 20 mm in front of it.
 #[wasm_bindgen]
 #[must_use]
 pub fn project(x: f32, y: f32, z: f32) -> Option<Vec<f64>> {

@@ -8,9 +8,9 @@ use wasm_bindgen::JsValue;
 use web_sys::{Element, PointerEvent, TouchEvent, WheelEvent};
 
 use super::dom::Dom;
-use super::page::{App, Line, on};
+use super::page::{App, ArmLine, on};
 use crate::arm_state::{breach_on_way, breach_text};
-use crate::scene::{Button, Refusal, Scene, SceneEvent, Unreachable};
+use crate::scene::{ArmScene, Button, RefusedWish, SceneEvent, WishRefusal};
 
 /// Installs the handlers of pointers, touches and the wheel.
 pub(super) fn listen(dom: &Dom) -> Result<(), JsValue> {
@@ -31,7 +31,7 @@ pub(super) fn listen(dom: &Dom) -> Result<(), JsValue> {
         })?;
     }
     on(&canvas, "pointerleave", |app, _: &PointerEvent, _| {
-        let event = app.scene.as_mut().and_then(Scene::pointer_left);
+        let event = app.scene.as_mut().and_then(ArmScene::pointer_left);
         app.scene_event(event);
     })?;
     // A finger on a joint or the tip moves the arm, on the base it turns the camera, elsewhere it scrolls the page. Two fingers
@@ -93,8 +93,8 @@ impl App {
             Some(SceneEvent::JointDragged { joint, degrees }) => self.drag_joint(joint, degrees),
             Some(SceneEvent::TipDragged(wish)) => {
                 let refused = match wish.reach {
-                    Err(Unreachable { why: Refusal::OutOfReach(_), .. }) => Some("unreachable"),
-                    Err(Unreachable { why: Refusal::Guarded(breach), .. }) => Some(breach_text(&breach)),
+                    Err(RefusedWish { why: WishRefusal::OutOfReach(_), .. }) => Some("unreachable"),
+                    Err(RefusedWish { why: WishRefusal::Guarded(breach), .. }) => Some(breach_text(&breach)),
                     Ok(angles) => self.drag_tip(angles),
                 };
                 self.unreachable = refused.map(|why| (wish.tip, why));
@@ -121,7 +121,7 @@ impl App {
     /// Moves a dragged joint: with its motor, or by a simulated hand if the motors of a simulated arm are off or damped.
     fn drag_joint(&mut self, joint: u8, degrees: f32) {
         let is_driven = self.client.state().motor_state == motor_state::SERVO;
-        let (Line::Simulated(source), Some(named), false) = (&mut self.line, Joint::new(joint), is_driven)
+        let (ArmLine::Simulated(source), Some(named), false) = (&mut self.line, Joint::new(joint), is_driven)
         else {
             return self.send_joint(joint, degrees);
         };

@@ -6,8 +6,8 @@
 //!     └── bytes ──┴── events of a person
 //! ```
 //!
-//! The main files: each imports files of its own group or of groups before it. class.rs, programs.rs and exercises.rs, with the
-//! files that they import, add the class, the programs of blocks and the exercises to `App`.
+//! The main files: among these, each imports only files of its own group or of groups before it. class.rs, programs.rs and
+//! exercises.rs, with the files that they import, add the class, the programs of blocks and the exercises to `App`.
 //!
 //! ```text
 //!   dom.rs, storage.rs, kept_recording.rs ──▶ page.rs ──▶ panels.rs, hand.rs, recording.rs, ──▶ controls.rs

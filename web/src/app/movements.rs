@@ -6,7 +6,7 @@ use sevenbot::Snapshot;
 use sevenbot::map::SPEED;
 
 use super::page::App;
-use crate::movement::{PlayProgress, Player};
+use crate::movement::{PagePlayer, PlayProgress};
 use crate::park::{Park, ParkProgress};
 use crate::stop::StopProgress;
 use crate::words;
@@ -91,7 +91,7 @@ impl App {
             return;
         }
         let (park, player) = (self.take_park(), self.player.take());
-        let speeds = park.map(|park| park.speeds()).or(player.as_ref().map(Player::speeds));
+        let speeds = park.map(|park| park.speeds()).or(player.as_ref().map(PagePlayer::speeds));
         self.client.stop(now, speeds);
         if let Some(player) = player {
             player.end_stream(now, &mut self.client);

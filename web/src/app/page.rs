@@ -18,11 +18,11 @@ use super::program_state::Programs;
 use super::storage;
 use super::time_line_state::TimeLines;
 use crate::client::Client;
-use crate::movement::Player;
+use crate::movement::PagePlayer;
 use crate::park::Park;
-use crate::plots::{History, Quantity, Sample};
-use crate::recorder::Recorder;
-use crate::scene::{Part, Scene};
+use crate::plots::{History, PlottedQuantity, Sample};
+use crate::recorder::PageRecorder;
+use crate::scene::{ArmPart, ArmScene};
 use crate::source::simulator::SimulatedSource;
 use crate::source::{LineState, Source};
 use crate::stop::StopProgress;
@@ -41,12 +41,12 @@ const STEPS_OF_STOP: u32 = 50;
 const PLOT_SECONDS: f64 = 10.0;
 
 /// The connection to the arm.
-pub(super) enum Line {
+pub(super) enum ArmLine {
     Simulated(Box<SimulatedSource>),
     Remote(Box<dyn Source>),
 }
 
-impl Line {
+impl ArmLine {
     fn source(&mut self) -> &mut dyn Source {
         match self {
             Self::Simulated(source) => source.as_mut(),
@@ -57,7 +57,7 @@ impl Line {
 
 /// The pupil's own arm while the pupil has the class's real arm.
 pub(super) struct OwnArm {
-    pub(super) line: Line,
+    pub(super) line: ArmLine,
     pub(super) client: Client,
     /// What the pupil chose in the list of arms.
     pub(super) chosen: String,
@@ -66,17 +66,17 @@ pub(super) struct OwnArm {
 /// The state of the page. The browser's handlers reach it by [`with_app`].
 pub(super) struct App {
     pub(super) dom: Dom,
-    pub(super) line: Line,
+    pub(super) line: ArmLine,
     pub(super) client: Client,
     /// The notice that the connection has ended was shown.
     pub(super) is_end_told: bool,
     /// The controls are disabled, because the server is read-only.
     pub(super) are_controls_off: bool,
     /// `None` if the browser has no WebGL2, or if the graphics driver reported an error at the start.
-    pub(super) scene: Option<Scene>,
+    pub(super) scene: Option<ArmScene>,
     pub(super) plot: CanvasRenderingContext2d,
     pub(super) history: History,
-    pub(super) quantity: Quantity,
+    pub(super) quantity: PlottedQuantity,
     pub(super) language: Language,
     /// Virtual time per real time of a simulated arm; 0 is a pause.
     pub(super) speed: f64,
@@ -87,14 +87,14 @@ pub(super) struct App {
     /// Before this round of reads, the registers may still hold the target from before the last input in a slider or field.
     pub(super) slid_round: u64,
     pub(super) frames: u32,
-    pub(super) hovered: Option<Part>,
+    pub(super) hovered: Option<ArmPart>,
     /// The position of a dragged tip to which the arm does not go, in mm, and the name of the text that gives the reason.
     pub(super) unreachable: Option<(Vec3, &'static str)>,
     /// The joint of a limp simulated arm that the pointer holds.
     pub(super) hand: Option<u8>,
-    pub(super) recorder: Option<Recorder>,
+    pub(super) recorder: Option<PageRecorder>,
     pub(super) park: Option<Park>,
-    pub(super) player: Option<Player>,
+    pub(super) player: Option<PagePlayer>,
     pub(super) recording: Option<KeptRecording>,
     pub(super) programs: Programs,
     pub(super) exercises: Exercises,
@@ -178,21 +178,21 @@ impl App {
         let tag = web_sys::window().and_then(|window| window.navigator().language());
         let tag = storage::load("language").or(tag);
         let language = Language::of_tag(&tag.unwrap_or_default());
-        let scene = Scene::new(dom.canvas("scene")?);
+        let scene = ArmScene::new(dom.canvas("scene")?);
         if let Err(reason) = &scene {
             dom.no_picture(language, reason);
         }
         let plot = plot_context(&dom)?;
         Ok(Self {
             dom,
-            line: Line::Simulated(Box::default()),
+            line: ArmLine::Simulated(Box::default()),
             client: Client::default(),
             is_end_told: false,
             are_controls_off: false,
             scene: scene.ok(),
             plot,
             history: History::new(PLOT_SECONDS),
-            quantity: Quantity::Angle,
+            quantity: PlottedQuantity::Angle,
             language,
             speed: 1.0,
             last_frame: browser_now(),
@@ -218,8 +218,8 @@ impl App {
     /// The time of the arm's clock: virtual for a simulated arm, the browser's clock for others.
     pub(super) fn now(&self) -> Instant {
         match &self.line {
-            Line::Simulated(source) => source.now(),
-            Line::Remote(_) => Instant::from_micros(whole(browser_now() * 1e3)),
+            ArmLine::Simulated(source) => source.now(),
+            ArmLine::Remote(_) => Instant::from_micros(whole(browser_now() * 1e3)),
         }
     }
 
@@ -230,7 +230,7 @@ impl App {
         let until = browser_now() + FRAME_BUDGET_MS;
         // Take replies before the client checks timeouts: slow pictures must not make them late.
         self.receive();
-        let mut rest = if matches!(self.line, Line::Simulated(_)) { elapsed * self.speed } else { 0.0 };
+        let mut rest = if matches!(self.line, ArmLine::Simulated(_)) { elapsed * self.speed } else { 0.0 };
         loop {
             let step = rest.min(STEP_MS);
             self.exchange(step, until);
@@ -257,7 +257,7 @@ impl App {
         let until = browser_now() + FRAME_BUDGET_MS;
         for _ in 0..STEPS_OF_STOP {
             self.exchange(STEP_MS, until);
-            let is_simulated = matches!(self.line, Line::Simulated(_));
+            let is_simulated = matches!(self.line, ArmLine::Simulated(_));
             if !is_simulated || self.client.stop_progress() != StopProgress::Verifying {
                 return;
             }
@@ -271,7 +271,7 @@ impl App {
         self.play(now);
         let bytes = self.client.poll(now);
         self.send(&bytes);
-        if let Line::Simulated(source) = &mut self.line {
+        if let ArmLine::Simulated(source) = &mut self.line {
             source.advance(virtual_ms * 1e3, || browser_now() < until);
         }
         self.receive();
@@ -314,12 +314,12 @@ impl App {
     }
 
     /// Changes to another arm. Ends everything that belongs to the last one.
-    pub(super) fn set_line(&mut self, line: Line) {
+    pub(super) fn set_line(&mut self, line: ArmLine) {
         drop(self.swap_line((line, Client::default())));
     }
 
     /// As [`Self::set_line`], but with the client of the arm. Returns the last line and its client.
-    pub(super) fn swap_line(&mut self, line: (Line, Client)) -> (Line, Client) {
+    pub(super) fn swap_line(&mut self, line: (ArmLine, Client)) -> (ArmLine, Client) {
         if self.recorder.is_some() {
             self.end_recording();
         }
@@ -331,7 +331,7 @@ impl App {
         self.exercises.end();
         self.hide_time_line();
         self.history = History::new(PLOT_SECONDS);
-        let is_simulated = matches!(self.line, Line::Simulated(_));
+        let is_simulated = matches!(self.line, ArmLine::Simulated(_));
         self.dom.set_hidden("simulator", !is_simulated);
         self.dom.end_notice();
         before

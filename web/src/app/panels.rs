@@ -10,7 +10,7 @@ use wasm_bindgen::JsValue;
 use web_sys::{Element, HtmlInputElement};
 
 use super::dom::{Dom, set_attribute, set_text};
-use super::page::{App, Line};
+use super::page::{App, ArmLine};
 use crate::arm_state::{ArmState, misplaced, tip};
 use crate::source::LineState;
 use crate::texts::Language;
@@ -80,7 +80,7 @@ pub(super) fn show(app: &mut App, state: &ArmState) {
     let reach = reach.map_or(String::new(), |why| format!(" · {}", language.text(why)));
     dom.set_text("tip", &format!("{}: x {x:.0}, y {y:.0}, z {z:.0} mm{reach}", language.text("tip")));
     dom.set_text("health", &health(app, state));
-    if let Line::Simulated(source) = &app.line {
+    if let ArmLine::Simulated(source) = &app.line {
         app.dom.set_text("time", &format!("{:.1} s", seconds(source.now())));
     }
     if is_open(&app.dom, "frames-panel") {
@@ -163,7 +163,8 @@ fn show_joints(dom: &Dom, language: Language, state: &ArmState) {
     }
 }
 
-/// Sets the sliders and the fields of the joints and the tip to the targets. `step` is their resolution in degrees.
+/// Sets the sliders and the fields of the joints and the tip to the targets. `step` is the resolution of the joints in
+/// degrees.
 fn show_targets(dom: &Dom, state: &ArmState, step: &str) {
     for (number, target) in (1..).zip(state.targets) {
         for id in [format!("joint-{number}"), format!("target-{number}")] {

@@ -3,10 +3,10 @@
 use arm_sim::world::World;
 use sevenbot::map::{fault, motor_state};
 
-use super::page::{App, Line, whole};
+use super::page::{App, ArmLine, whole};
 use super::panels;
 use crate::arm_state::ArmState;
-use crate::plots::{Plot, Quantity, draw};
+use crate::plots::{Plot, PlottedQuantity, draw};
 use crate::scene::{Rgb, Theme, View, things};
 
 /// The plot is drawn with every third picture.
@@ -48,7 +48,7 @@ impl App {
     /// The room of the simulated arm; `None` for a real arm, or without a room.
     pub(super) fn world(&self) -> Option<&World> {
         match &self.line {
-            Line::Simulated(source) => source.simulation().plant().world(),
+            ArmLine::Simulated(source) => source.simulation().plant().world(),
             _ => None,
         }
     }
@@ -63,9 +63,9 @@ impl App {
             canvas.set_height(height);
         }
         let (name, unit) = match self.quantity {
-            Quantity::Angle => ("angle", "°"),
-            Quantity::Load => ("load", "%"),
-            Quantity::Velocity => ("velocity", "°/s"),
+            PlottedQuantity::Angle => ("angle", "°"),
+            PlottedQuantity::Load => ("load", "%"),
+            PlottedQuantity::Velocity => ("velocity", "°/s"),
         };
         let title = format!("{} ({unit})", self.language.text(name));
         let (quantity, shown) = (self.quantity, [true; 7]);

@@ -9,7 +9,7 @@ use super::editor::Editor;
 use super::files;
 use super::page::App;
 use super::storage;
-use crate::program::{Pace, ProgramProgress, ProgramRun};
+use crate::program::{ProgramProgress, ProgramRun, RunMode};
 use crate::words;
 
 /// The key of the program in the browser's storage.
@@ -20,8 +20,8 @@ impl App {
     pub(super) fn act_on_program(&mut self, action: &str) -> bool {
         match action {
             "programs" => self.toggle_programs(),
-            "run" => self.run_program(Pace::Running),
-            "step" => self.run_program(Pace::SingleSteps),
+            "run" => self.run_program(RunMode::Running),
+            "step" => self.run_program(RunMode::SingleSteps),
             "add-pose" => Editor.add_pose(self.client.state().angles().map(hundredths)),
             "save-program" => files::save(&self.dom, "program.json", &self.programs.text),
             "save-python" => {
@@ -130,10 +130,10 @@ impl App {
         self.dom.notice(&text);
     }
 
-    /// Begins the program, or continues the running one at this pace.
-    fn run_program(&mut self, pace: Pace) {
+    /// Begins the program, or continues the running one in this mode.
+    fn run_program(&mut self, mode: RunMode) {
         if let Some(run) = &mut self.programs.run {
-            run.go_on(pace);
+            run.go_on(mode);
             return self.show_time_line(None);
         }
         if self.is_stopping() {
@@ -145,7 +145,7 @@ impl App {
                 self.show_time_line(None);
                 let before = self.registers_before_movement();
                 let now = self.now();
-                self.programs.run = Some(ProgramRun::new(&program, pace, &before, now));
+                self.programs.run = Some(ProgramRun::new(&program, mode, &before, now));
                 self.programs.ended = None;
                 Editor.warn(None, "");
                 self.dom.end_notice();

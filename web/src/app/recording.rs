@@ -9,8 +9,8 @@ use super::dom::number;
 use super::files;
 use super::kept_recording::KeptRecording;
 use super::page::App;
-use crate::movement::{PlayRefusal, Player};
-use crate::recorder::Recorder;
+use crate::movement::{PagePlayer, PlayRefusal};
+use crate::recorder::PageRecorder;
 
 /// The longest time that a user can choose for the approach to the first pose of a movement, in seconds.
 const LONGEST_APPROACH: f32 = 60.0;
@@ -20,12 +20,12 @@ impl App {
         if self.recorder.is_some() {
             self.end_recording();
         } else {
-            self.recorder = Some(Recorder::new(self.now()));
+            self.recorder = Some(PageRecorder::new(self.now()));
         }
     }
 
     pub(super) fn end_recording(&mut self) {
-        let recorded = self.recorder.take().and_then(Recorder::finish);
+        let recorded = self.recorder.take().and_then(PageRecorder::finish);
         if let Some(recorded) = recorded.and_then(|text| KeptRecording::parse(text).ok()) {
             self.keep(recorded);
         }
@@ -47,7 +47,7 @@ impl App {
         let approach = seconds.filter(|seconds| *seconds > 0.0);
         let approach = approach.map(|seconds| Duration::from_secs_f32(seconds.min(LONGEST_APPROACH)));
         let now = self.now();
-        match Player::new(&recording.text, self.client.registers(), approach, now) {
+        match PagePlayer::new(&recording.text, self.client.registers(), approach, now) {
             Ok(player) => {
                 self.show_time_line(None);
                 let before = self.registers_before_movement();

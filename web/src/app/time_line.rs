@@ -9,7 +9,7 @@ use sevenbot::recording::Recording;
 use web_sys::HtmlInputElement;
 
 use super::dom::{number, set_attribute};
-use super::page::{App, Line, browser_now};
+use super::page::{App, ArmLine, browser_now};
 use super::time_line_state::TimeLines;
 use crate::preview::{Preview, PreviewEnd};
 use crate::time_line::TimeLine;
@@ -42,8 +42,8 @@ impl App {
         };
         self.show_time_line(None);
         let preview = match &self.line {
-            Line::Simulated(arm) => Some(Preview::on_copy_of(arm, &program)),
-            Line::Remote(_) => Preview::on_new_arm(self.client.registers(), &program),
+            ArmLine::Simulated(arm) => Some(Preview::on_copy_of(arm, &program)),
+            ArmLine::Remote(_) => Preview::on_new_arm(self.client.registers(), &program),
         };
         let text = if preview.is_some() { PREVIEW_RUNS } else { "preview-elsewhere" };
         self.dom.notice(self.language.text(text));

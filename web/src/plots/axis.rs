@@ -2,7 +2,7 @@
 
 /// The range of values of an axis, and the step of its ticks.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Axis {
+pub struct ValueAxis {
     /// The value at the lower end, a multiple of `step`.
     pub low: f32,
     /// The value at the upper end, a multiple of `step`.
@@ -11,7 +11,7 @@ pub struct Axis {
     pub step: f32,
 }
 
-impl Axis {
+impl ValueAxis {
     /// An axis with zero in the middle, which contains all finite values and at least `-least` to `least`. Its step is round: 1,
     /// 2 or 5 times a power of ten. Its ends are multiples of the step. At most `most_steps` steps are between them, unless
     /// rounding adds one at each end.
@@ -58,7 +58,7 @@ mod tests {
             (-372.0, 10.0, [400.0, 200.0]),
             (99.0, 1.0, [100.0, 50.0]),
         ] {
-            let axis = Axis::around_zero([largest, f32::NAN].into_iter(), least, 4.0);
+            let axis = ValueAxis::around_zero([largest, f32::NAN].into_iter(), least, 4.0);
             assert_eq!([axis.high, axis.step], wanted, "{largest}");
             let ticks: Vec<f32> = axis.ticks().collect();
             assert!(ticks.len() >= 3 && ticks.len() <= 5 && ticks.contains(&0.0), "{ticks:?}");
@@ -68,7 +68,7 @@ mod tests {
 
     #[test]
     fn a_value_has_a_place_and_stays_within_the_plot() {
-        let axis = Axis { low: -50.0, high: 150.0, step: 50.0 };
+        let axis = ValueAxis { low: -50.0, high: 150.0, step: 50.0 };
         assert_eq!([-50.0, 50.0, 150.0, 999.0].map(|value| axis.place(value)), [0.0, 0.5, 1.0, 1.0]);
     }
 

@@ -3,8 +3,8 @@
 use wasm_bindgen::JsValue;
 use web_sys::CanvasRenderingContext2d as Context;
 
-use super::axis::Axis;
-use super::history::{History, Quantity};
+use super::axis::ValueAxis;
+use super::history::{History, PlottedQuantity};
 use crate::scene::theme::{Palette, Theme};
 
 /// Margins of the plot, in CSS pixels. The left and the lower margin hold the numbers of the axes.
@@ -21,7 +21,7 @@ const FONT: &str = "12px system-ui, sans-serif";
 #[derive(Clone, Copy, Debug)]
 pub struct Plot<'a> {
     /// The quantity on the vertical axis.
-    pub quantity: Quantity,
+    pub quantity: PlottedQuantity,
     /// The name of the quantity with its unit, such as "Angle (°)".
     pub title: &'a str,
     /// The unit of time, such as "s".
@@ -50,7 +50,7 @@ impl Area {
         self.left + part * self.width
     }
 
-    fn y(&self, axis: &Axis, value: f32) -> f64 {
+    fn y(&self, axis: &ValueAxis, value: f32) -> f64 {
         self.top + (1.0 - f64::from(axis.place(value))) * self.height
     }
 }
@@ -92,19 +92,25 @@ pub fn draw(context: &Context, plot: &Plot, history: &History) -> Result<(), JsV
 }
 
 /// The vertical axis: fixed for angles, fitted to the values for loads and velocities.
-fn axis_of(plot: &Plot, history: &History) -> Axis {
+fn axis_of(plot: &Plot, history: &History) -> ValueAxis {
     let least = match plot.quantity {
-        Quantity::Angle => return Axis { low: 0.0, high: 180.0, step: 45.0 },
-        Quantity::Load | Quantity::Velocity => 10.0,
+        PlottedQuantity::Angle => return ValueAxis { low: 0.0, high: 180.0, step: 45.0 },
+        PlottedQuantity::Load | PlottedQuantity::Velocity => 10.0,
     };
     let values = history.samples().flat_map(|sample| {
         let joints = sample.values(plot.quantity).iter().zip(plot.shown);
         joints.filter(|(_, is_shown)| *is_shown).map(|(value, _)| *value)
     });
-    Axis::around_zero(values, least, 4.0)
+    ValueAxis::around_zero(values, least, 4.0)
 }
 
-fn draw_axes(context: &Context, plot: &Plot, area: Area, axis: &Axis, seconds: f64) -> Result<(), JsValue> {
+fn draw_axes(
+    context: &Context,
+    plot: &Plot,
+    area: Area,
+    axis: &ValueAxis,
+    seconds: f64,
+) -> Result<(), JsValue> {
     let palette = plot.theme.palette();
     context.set_fill_style_str(&palette.text.css());
     context.set_text_baseline("middle");
@@ -164,7 +170,7 @@ fn draw_legend(context: &Context, plot: &Plot, palette: &Palette) -> Result<(), 
     Ok(())
 }
 
-fn draw_lines(context: &Context, plot: &Plot, area: Area, axis: &Axis, history: &History) {
+fn draw_lines(context: &Context, plot: &Plot, area: Area, axis: &ValueAxis, history: &History) {
     context.set_line_width(1.5);
     context.set_line_join("round");
     let (end, seconds) = (history.end(), history.seconds());
@@ -191,7 +197,7 @@ mod tests {
     use crate::plots::Sample;
 
     const PLOT: Plot = Plot {
-        quantity: Quantity::Velocity,
+        quantity: PlottedQuantity::Velocity,
         title: "Velocity (°/s)",
         seconds: "s",
         shown: [true, true, false, true, true, true, true],
@@ -205,15 +211,15 @@ mod tests {
         let mut history = History::new(10.0);
         let velocities = [0.0, -61.0, 900.0, 5.0, 0.0, 0.0, 0.0];
         history.push(Sample { velocities, ..Sample::default() });
-        assert_eq!(axis_of(&PLOT, &history), Axis { low: -100.0, high: 100.0, step: 50.0 });
-        let angles = Plot { quantity: Quantity::Angle, ..PLOT };
-        assert_eq!(axis_of(&angles, &history), Axis { low: 0.0, high: 180.0, step: 45.0 });
+        assert_eq!(axis_of(&PLOT, &history), ValueAxis { low: -100.0, high: 100.0, step: 50.0 });
+        let angles = Plot { quantity: PlottedQuantity::Angle, ..PLOT };
+        assert_eq!(axis_of(&angles, &history), ValueAxis { low: 0.0, high: 180.0, step: 45.0 });
     }
 
     #[test]
     fn values_and_times_have_places_in_the_area() {
         let area = Area { left: 40.0, top: 20.0, width: 300.0, height: 100.0 };
-        let axis = Axis { low: 0.0, high: 180.0, step: 45.0 };
+        let axis = ValueAxis { low: 0.0, high: 180.0, step: 45.0 };
         assert_eq!((area.x(0.0), area.x(1.0)), (40.0, 340.0));
         assert_eq!([0.0, 90.0, 180.0].map(|value| area.y(&axis, value)), [120.0, 70.0, 20.0]);
     }

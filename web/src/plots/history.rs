@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 /// The quantity that a plot shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Quantity {
+pub enum PlottedQuantity {
     /// Measured angle, in degrees.
     Angle,
     /// Load, in percent of the stall torque.
@@ -29,11 +29,11 @@ pub struct Sample {
 impl Sample {
     /// The values of one quantity, joint 1 first.
     #[must_use]
-    pub const fn values(&self, quantity: Quantity) -> &[f32; 7] {
+    pub const fn values(&self, quantity: PlottedQuantity) -> &[f32; 7] {
         match quantity {
-            Quantity::Angle => &self.angles,
-            Quantity::Load => &self.loads,
-            Quantity::Velocity => &self.velocities,
+            PlottedQuantity::Angle => &self.angles,
+            PlottedQuantity::Load => &self.loads,
+            PlottedQuantity::Velocity => &self.velocities,
         }
     }
 }

@@ -3,7 +3,7 @@
 //! ```text
 //!   Sample ──▶ History ──▶ draw(Plot) ──▶ canvas 2D
 //!                              ▲
-//!               Axis: round numbers
+//!               ValueAxis: round numbers
 //! ```
 
 pub mod axis;
@@ -11,4 +11,4 @@ pub mod draw;
 pub mod history;
 
 pub use draw::{Plot, draw, legend_height};
-pub use history::{History, Quantity, Sample};
+pub use history::{History, PlottedQuantity, Sample};

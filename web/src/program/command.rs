@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use block_programs::Command;
+use block_programs::ProgramCommand;
 use protocol_core::time::Instant;
 use sevenbot::approach::ApproachRule;
 use sevenbot::cartesian::{
@@ -15,16 +15,16 @@ use sevenbot::moves::Pace;
 use sevenbot::{Angle, FineAngle, Health, MoveTime, Snapshot, Speed};
 
 use super::failure::ProgramFailure;
-use super::joint_move::JointMove;
+use super::joint_move::ProgramMove;
 use crate::arm_state::breach_text;
 use crate::client::Client;
 use crate::confirmed::Confirmed;
-use crate::movement::{PlayProgress, PlayRefusal, Player};
+use crate::movement::{PagePlayer, PlayProgress, PlayRefusal};
 use crate::stop::since_start;
 
 /// The current action of a program. A block may need several actions, one after the other.
 #[derive(Debug)]
-pub(super) enum Action {
+pub(super) enum RunStage {
     /// The program was not polled yet.
     Start,
     /// Waits until this round of reads is complete.
@@ -33,8 +33,8 @@ pub(super) enum Action {
     Ready,
     /// Waits until the arm has confirmed writes, and continues with the next action.
     Writing(Confirmed, Next),
-    Moving(JointMove),
-    Line(Box<Player>),
+    Moving(ProgramMove),
+    Line(Box<PagePlayer>),
     /// Waits until this time since the start of the clock.
     Waiting(Duration),
     /// Waits until the arm has confirmed the last writes of the program.
@@ -52,7 +52,7 @@ pub(super) enum Next {
     Arrival(FineTargets),
 }
 
-impl Action {
+impl RunStage {
     pub(super) const fn may_move(&self) -> bool {
         matches!(self, Self::Writing(_, Next::Arrival(_)) | Self::Moving(_) | Self::Line(_))
     }
@@ -76,7 +76,9 @@ impl Action {
                 let following = match next {
                     Next::Nothing => return Ok(true),
                     Next::Targets(targets) => write_targets(*targets, now, client),
-                    Next::Arrival(targets) => Self::Moving(JointMove::new(*targets, now, client.registers())),
+                    Next::Arrival(targets) => {
+                        Self::Moving(ProgramMove::new(*targets, now, client.registers()))
+                    }
                 };
                 *self = following;
                 Ok(false)
@@ -85,51 +87,56 @@ impl Action {
     }
 }
 
-/// Begins a command: writes the first frames, if the command has any. Returns the action that carries it out.
-pub(super) fn begin(command: &Command, now: Instant, client: &mut Client) -> Result<Action, ProgramFailure> {
+/// Begins a command: writes its first frames, unless they come with the first poll, as for a line. Returns the action that
+/// carries it out.
+pub(super) fn begin(
+    command: &ProgramCommand,
+    now: Instant,
+    client: &mut Client,
+) -> Result<RunStage, ProgramFailure> {
     match command {
-        Command::Wait(time) => Ok(Action::Waiting(since_start(now) + *time)),
-        Command::Vacuum(is_on) => {
+        ProgramCommand::Wait(time) => Ok(RunStage::Waiting(since_start(now) + *time)),
+        ProgramCommand::Vacuum(is_on) => {
             let frames = vec![(VACUUM_PUMP.address, vec![u8::from(*is_on)])];
-            Ok(Action::Writing(Confirmed::write(frames, now, client), Next::Nothing))
+            Ok(RunStage::Writing(Confirmed::write(frames, now, client), Next::Nothing))
         }
-        Command::Joints { targets, pace } => Ok(set_pace(*targets, *pace, now, client)),
-        Command::Grip { claw } => {
+        ProgramCommand::Joints { targets, pace } => Ok(set_pace(*targets, *pace, now, client)),
+        ProgramCommand::Grip { claw } => {
             let frames = vec![(EFFECTOR_TYPE.address, vec![effector::GRIPPER])];
             let targets = [None, None, None, None, None, None, Some(*claw)];
-            Ok(Action::Writing(Confirmed::write(frames, now, client), Next::Targets(targets)))
+            Ok(RunStage::Writing(Confirmed::write(frames, now, client), Next::Targets(targets)))
         }
-        Command::Tip { tip, tool, pace } => {
+        ProgramCommand::Tip { tip, tool, pace } => {
             let targets = tip_targets(*tip, *tool, *pace, client.registers())?;
             Ok(set_pace(targets, *pace, now, client))
         }
-        Command::Line { tip, tool, speed } => {
+        ProgramCommand::Line { tip, tool, speed } => {
             let registers = client.registers();
             let line = line(*tip, *tool, *speed, registers)?;
-            let player = Player::along(line.recording, registers, ApproachRule::Slowly, now);
-            Ok(Action::Line(Box::new(player.map_err(refused_line)?)))
+            let player = PagePlayer::along(line.recording, registers, ApproachRule::Slowly, now);
+            Ok(RunStage::Line(Box::new(player.map_err(refused_line)?)))
         }
     }
 }
 
-/// Writes the speed and the time of `pace`, if it has any, for the joints with a target. The targets follow when the arm has
-/// confirmed these.
-fn set_pace(targets: FineTargets, pace: Pace, now: Instant, client: &mut Client) -> Action {
+/// Writes the speed and the time of `pace`, if it has any, for the joints with a target. With a time only, also writes the
+/// maximum speed. The targets follow when the arm has confirmed these.
+fn set_pace(targets: FineTargets, pace: Pace, now: Instant, client: &mut Client) -> RunStage {
     let steps = |steps: u8| targets.map(|target| target.map(|_| steps));
     let speed = pace.speed.or(pace.time.map(|_| Speed::MAXIMUM));
     let speeds = speed.map(|speed| frames_for(&SPEED, &steps(speed.steps())));
     let times = pace.time.map(|time| frames_for(&TIME, &steps(time.steps())));
     let frames = speeds.into_iter().chain(times).flatten().collect();
-    Action::Writing(Confirmed::write(frames, now, client), Next::Targets(targets))
+    RunStage::Writing(Confirmed::write(frames, now, client), Next::Targets(targets))
 }
 
-fn write_targets(targets: FineTargets, now: Instant, client: &mut Client) -> Action {
+fn write_targets(targets: FineTargets, now: Instant, client: &mut Client) -> RunStage {
     let frames = if client.registers().has_extended_block() {
         fine_frames(&targets)
     } else {
         frames_for(&TARGET_POSITION, &targets.map(|target| target.map(|angle| angle.nearest().degrees())))
     };
-    Action::Writing(Confirmed::write(frames, now, client), Next::Arrival(targets))
+    RunStage::Writing(Confirmed::write(frames, now, client), Next::Arrival(targets))
 }
 
 /// The targets of the joints for a point of the tip.

@@ -4,7 +4,7 @@ use block_programs::{BlockId, ProgramError};
 use sevenbot::Joint;
 use sevenbot::health::MoveFault;
 
-use crate::confirmed::NotTaken;
+use crate::confirmed::Unconfirmed;
 use crate::movement::PlayFailure;
 
 /// Why a program ends early.
@@ -44,8 +44,8 @@ impl From<MoveFault> for ProgramFailure {
     }
 }
 
-impl From<NotTaken> for ProgramFailure {
-    fn from(_: NotTaken) -> Self {
+impl From<Unconfirmed> for ProgramFailure {
+    fn from(_: Unconfirmed) -> Self {
         Self::Arm(PlayFailure::NotTaken)
     }
 }

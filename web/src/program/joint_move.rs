@@ -26,7 +26,7 @@ const CLAW: usize = 6;
 
 /// A move whose targets the arm has confirmed.
 #[derive(Debug)]
-pub(super) struct JointMove {
+pub(super) struct ProgramMove {
     targets: FineTargets,
     /// The joints with a target, as [`Joint::bit`]s.
     joints: u8,
@@ -42,7 +42,7 @@ pub(super) struct JointMove {
     resting: Option<Duration>,
 }
 
-impl JointMove {
+impl ProgramMove {
     /// Begins to wait at `now` for a move to these targets.
     pub(super) fn new(targets: FineTargets, now: Instant, registers: &Snapshot) -> Self {
         let with_target = Joint::ALL.into_iter().zip(&targets).filter(|(_, target)| target.is_some());

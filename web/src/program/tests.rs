@@ -98,7 +98,7 @@ fn a_program_ends_where_the_arm_does_not_carry_it_out() {
 fn d11_a_joint_on_its_way_holds_when_another_joint_is_moved() {
     let mut tab = Tab::new();
     let before = tab.registers();
-    let mut run = tab.begin(&long_move(), Pace::Running);
+    let mut run = tab.begin(&long_move(), RunMode::Running);
     for _ in 0..60 {
         assert_eq!(run.poll(tab.arm.now(), &mut tab.client), ProgramProgress::Running);
         tab.pass(1);
@@ -162,13 +162,13 @@ fn single_steps_wait_before_each_block() {
     let mut tab = Tab::new();
     let first = r#"{"type": "arm_vacuum", "id": "on", "fields": {"STATE": "ON"},
                     "next": {"block": {"type": "arm_vacuum", "id": "off", "fields": {"STATE": "OFF"}}}}"#;
-    let mut run = tab.begin(&workspace(first), Pace::SingleSteps);
+    let mut run = tab.begin(&workspace(first), RunMode::SingleSteps);
     let mut lit = Vec::new();
     for _ in 0..600 {
         match run.poll(tab.arm.now(), &mut tab.client) {
             ProgramProgress::Waiting => {
                 lit.push((run.block().map(|block| block.to_string()), tab.client.registers().at(31)));
-                run.go_on(Pace::SingleSteps);
+                run.go_on(RunMode::SingleSteps);
             }
             ProgramProgress::Running => {}
             end => {
@@ -186,7 +186,7 @@ fn an_endless_loop_lets_the_page_go_on() {
     let mut tab = Tab::new();
     let endless = r#"{"type": "controls_whileUntil", "id": "loop", "fields": {"MODE": "WHILE"}, "inputs": {"BOOL":
                       {"block": {"type": "logic_boolean", "fields": {"BOOL": "TRUE"}}}}}"#;
-    let mut run = tab.begin(&workspace(endless), Pace::Running);
+    let mut run = tab.begin(&workspace(endless), RunMode::Running);
     for _ in 0..300 {
         assert_eq!(run.poll(tab.arm.now(), &mut tab.client), ProgramProgress::Running);
         tab.pass(1);
@@ -254,7 +254,7 @@ proptest! {
     fn after_a_stop_at_any_moment_the_arm_never_goes_on(workspace in any_program(), moment in 0_u32..900) {
         let mut tab = Tab::new();
         let before = tab.registers();
-        let mut run = Some(tab.begin(&workspace, Pace::Running));
+        let mut run = Some(tab.begin(&workspace, RunMode::Running));
         for _ in 0..moment {
             let progress = run.as_mut().map(|run| run.poll(tab.arm.now(), &mut tab.client));
             if progress.is_some_and(|progress| progress != ProgramProgress::Running) {

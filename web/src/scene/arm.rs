@@ -14,7 +14,7 @@ pub const BODIES: usize = Body::ALL.len();
 
 /// What a person can point at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Part {
+pub enum ArmPart {
     /// The base, which no joint turns.
     Base,
     /// The part that this joint, 1 to 7, moves.
@@ -23,7 +23,7 @@ pub enum Part {
     Tip,
 }
 
-impl Part {
+impl ArmPart {
     /// The part to which a body belongs.
     #[must_use]
     pub const fn of(body: Body) -> Self {
@@ -47,17 +47,17 @@ pub struct Hit {
 
 /// The meshes of all bodies.
 #[derive(Clone, Debug)]
-pub struct Arm {
+pub struct ArmMeshes {
     meshes: [(Body, Mesh); BODIES],
 }
 
-impl Default for Arm {
+impl Default for ArmMeshes {
     fn default() -> Self {
         Self { meshes: Body::ALL.map(|body| (body, body.mesh())) }
     }
 }
 
-impl Arm {
+impl ArmMeshes {
     /// Each body with its mesh, in the order of [`Body::ALL`].
     #[must_use]
     pub const fn meshes(&self) -> &[(Body, Mesh); BODIES] {
@@ -151,10 +151,10 @@ mod tests {
 
     #[test]
     fn a_ray_from_above_meets_the_forearm_and_one_from_the_side_the_rear_arm() {
-        let arm = Arm::default();
+        let arm = ArmMeshes::default();
         let down = |x, y| Ray { origin: Vec3::new(x, y, 900.0), direction: Vec3::NEG_Z };
         let hit = arm.pick(POSE, down(0.0, 80.0)).expect("a body");
-        assert_eq!((hit.body, Part::of(hit.body)), (Body::Forearm, Part::Joint(3)));
+        assert_eq!((hit.body, ArmPart::of(hit.body)), (Body::Forearm, ArmPart::Joint(3)));
         assert_eq!(arm.pick(POSE, down(70.0, 0.0)).map(|hit| hit.body), Some(Body::Base));
         assert_eq!(arm.pick(POSE, down(300.0, 0.0)), None);
         let side = Ray { origin: Vec3::new(900.0, 5.0, 130.0), direction: Vec3::NEG_X };
@@ -163,7 +163,7 @@ mod tests {
 
     #[test]
     fn the_point_of_a_hit_is_on_the_ray() {
-        let (arm, camera) = (Arm::default(), Camera::default());
+        let (arm, camera) = (ArmMeshes::default(), Camera::default());
         let mut hits = 0;
         for step in 0..40 {
             let pixel = glam::Vec2::new(480.0 + 8.0 * step as f32, 300.0 + 2.0 * step as f32);

@@ -8,7 +8,7 @@ use wasm_bindgen::closure::Closure;
 use wasm_bindgen::{JsCast, JsValue};
 use web_sys::{Event, HtmlCanvasElement, WebGl2RenderingContext as Gl, WebGlContextAttributes};
 
-use super::arm::{Angles, Arm, Part};
+use super::arm::{Angles, ArmMeshes, ArmPart};
 use super::camera::Camera;
 use super::pointer::{self, Button, Pointer, SceneEvent};
 use super::renderer::Renderer;
@@ -20,10 +20,10 @@ const UNMASKED_RENDERER: u32 = 0x9246;
 const SMOOTH_RATIO: f32 = 2.0;
 
 /// The arm on a canvas: picture, camera and pointers.
-pub struct Scene {
+pub struct ArmScene {
     canvas: HtmlCanvasElement,
     gl: Gl,
-    arm: Arm,
+    arm: ArmMeshes,
     camera: Camera,
     pointer: Pointer,
     /// Rendered pixels per CSS pixel.
@@ -43,7 +43,7 @@ struct Picture {
     pixels: [u32; 2],
 }
 
-impl Scene {
+impl ArmScene {
     /// Prepares the graphics of a canvas.
     ///
     /// # Errors
@@ -51,7 +51,7 @@ impl Scene {
     pub fn new(canvas: HtmlCanvasElement) -> Result<Self, JsValue> {
         let gl = context(&canvas)?.ok_or("this browser has no WebGL2")?;
         let ratio = pixel_ratio(&gl)?;
-        let arm = Arm::default();
+        let arm = ArmMeshes::default();
         let renderer = Renderer::new(gl.clone(), &arm)?;
         let is_restored = watch_context(&canvas)?;
         let (camera, pointer) = (Camera::default(), Pointer::default());
@@ -88,7 +88,7 @@ impl Scene {
 
     /// The part of an arm with these angles at a point of the canvas, in CSS pixels from its top left.
     #[must_use]
-    pub fn pick(&self, x: f32, y: f32, angles: Angles) -> Option<Part> {
+    pub fn pick(&self, x: f32, y: f32, angles: Angles) -> Option<ArmPart> {
         Pointer::part_at(&self.arm, &self.camera, angles, Vec2::new(x, y))
     }
 

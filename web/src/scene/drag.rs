@@ -28,7 +28,7 @@ pub struct JointDrag {
 }
 
 impl JointDrag {
-    /// Begins a drag at a hit. `None` for the base, or if the point is behind the camera.
+    /// Begins a drag at a hit. `None` for the base, or if [`Camera::project`] gives no pixel for the point.
     #[must_use]
     pub fn start(hit: Hit, angles: Angles, camera: &Camera, pointer: Vec2) -> Option<Self> {
         let joint = hit.body.joint()?;
@@ -109,12 +109,12 @@ pub struct TipWish {
     /// The wanted position of the tip, in mm.
     pub tip: Vec3,
     /// The angles that reach the position, or the reason why the arm cannot go there.
-    pub reach: Result<Angles, Unreachable>,
+    pub reach: Result<Angles, RefusedWish>,
 }
 
 /// The reason why the tip cannot be at a position.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Refusal {
+pub enum WishRefusal {
     /// No angles reach the position with the direction of the tool.
     OutOfReach(NoSolution),
     /// The guard of the workspace does not allow the pose.
@@ -123,9 +123,9 @@ pub enum Refusal {
 
 /// The failure for a position that is out of reach or not allowed.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Unreachable {
+pub struct RefusedWish {
     /// Out of reach, or refused by the guard.
-    pub why: Refusal,
+    pub why: WishRefusal,
     /// For a position out of reach, the angles of the nearest pose with the same direction of the tool. `None` if there is none,
     /// if the guard does not allow the pose, or if the guard refused the position.
     pub nearest: Option<Angles>,
@@ -143,15 +143,15 @@ pub fn wish(tip: Vec3, angles: Angles) -> TipWish {
     let reach = reach.map_err(|why| {
         let nearest = nearest_tip(asked, tool).and_then(|point| nearest_solution(from_vector(point), angles));
         let nearest = nearest.filter(|&nearest| allowed(nearest).is_ok());
-        Unreachable { why: Refusal::OutOfReach(why), nearest }
+        RefusedWish { why: WishRefusal::OutOfReach(why), nearest }
     });
     TipWish { tip, reach: reach.and_then(|reached| allowed(reached).map(|()| reached)) }
 }
 
 /// Checks these angles with the guard of the workspace.
-fn allowed(angles: Angles) -> Result<(), Unreachable> {
+fn allowed(angles: Angles) -> Result<(), RefusedWish> {
     let [t1, t2, t3, t4, t5, ..] = angles.map(f64::from);
-    let refused = |breach| Unreachable { why: Refusal::Guarded(breach), nearest: None };
+    let refused = |breach| RefusedWish { why: WishRefusal::Guarded(breach), nearest: None };
     Guard::default().check_pose([t1, t2, t3, t4, t5]).map_err(refused)
 }
 
@@ -187,7 +187,7 @@ pub struct TipDrag {
 }
 
 impl TipDrag {
-    /// Begins a drag of the tip. `None` if the tip is behind the camera.
+    /// Begins a drag of the tip. `None` if [`Camera::project`] gives no pixel for the tip.
     #[must_use]
     pub fn start(angles: Angles, camera: &Camera, pointer: Vec2) -> Option<Self> {
         Some(Self { offset: pointer - camera.project(tip_of(angles))?, start: angles })
@@ -203,10 +203,10 @@ impl TipDrag {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::arm::Arm;
+    use crate::scene::arm::ArmMeshes;
     use crate::scene::camera::Preset;
     use kinematics::limits::check;
-    use sevenbot::cartesian::Obstacle;
+    use sevenbot::cartesian::FixedObstacle;
 
     const POSE: Angles = [90.0, 100.0, 75.0, 80.0, 110.0, 70.0, 60.0];
 
@@ -290,7 +290,7 @@ mod tests {
     fn a_tip_out_of_reach_is_told_with_the_nearest_pose() {
         let far = wish(Vec3::new(0.0, 600.0, 100.0), POSE);
         let unreachable = far.reach.expect_err("too far");
-        let too_far = Refusal::OutOfReach(NoSolution::TooFar);
+        let too_far = WishRefusal::OutOfReach(NoSolution::TooFar);
         assert_eq!((far.tip, unreachable.why), (Vec3::new(0.0, 600.0, 100.0), too_far));
         let nearest = unreachable.nearest.expect("a pose");
         assert_eq!(check(nearest.map(f64::from)), Ok(()));
@@ -302,17 +302,17 @@ mod tests {
     fn a_tip_below_the_table_or_in_the_base_is_refused() {
         let down: Angles = [90.0, 88.0, 110.0, 90.0, 135.0, 90.0, 80.0];
         let refused = |x: f32, y: f32, z: f32| match wish(Vec3::new(x, y, z), down).reach {
-            Err(Unreachable { why: Refusal::Guarded(breach), .. }) => Some(breach.obstacle),
+            Err(RefusedWish { why: WishRefusal::Guarded(breach), .. }) => Some(breach.obstacle),
             _ => None,
         };
         assert_eq!(refused(0.0, 185.0, -50.0), None);
-        assert_eq!(refused(0.0, 185.0, -100.0), Some(Obstacle::Table));
-        assert_eq!(refused(0.0, 100.0, -40.0), Some(Obstacle::Base));
+        assert_eq!(refused(0.0, 185.0, -100.0), Some(FixedObstacle::Table));
+        assert_eq!(refused(0.0, 100.0, -40.0), Some(FixedObstacle::Base));
     }
 
     #[test]
     fn what_is_picked_can_be_dragged() {
-        let (arm, camera) = (Arm::default(), Camera::default());
+        let (arm, camera) = (ArmMeshes::default(), Camera::default());
         let pixel =
             camera.project(point_of(POSE, Body::RearArm, Vec3::new(0.0, 30.0, 60.0))).expect("in front");
         let hit = arm.pick(POSE, camera.ray(pixel)).expect("a body");

@@ -21,10 +21,10 @@ pub mod theme;
 pub mod things;
 pub mod view;
 
-pub use arm::{Angles, Part};
+pub use arm::{Angles, ArmPart};
 pub use camera::{Camera, Preset};
-pub use canvas::Scene;
-pub use drag::{Refusal, TipWish, Unreachable, wish};
+pub use canvas::ArmScene;
+pub use drag::{RefusedWish, TipWish, WishRefusal, wish};
 pub use pointer::{Button, SceneEvent};
 pub use theme::{Rgb, Theme};
 pub use things::things;

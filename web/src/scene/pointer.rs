@@ -8,7 +8,7 @@
 
 use glam::Vec2;
 
-use super::arm::{Angles, Arm, Part, tip_of};
+use super::arm::{Angles, ArmMeshes, ArmPart, tip_of};
 use super::camera::Camera;
 use super::drag::{JointDrag, TipDrag, TipWish};
 
@@ -21,7 +21,7 @@ const ZOOM_PER_PIXEL: f32 = 0.0012;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SceneEvent {
     /// The pointer is over another part now; `None` if it is over no part.
-    Hovered(Option<Part>),
+    Hovered(Option<ArmPart>),
     /// The pointer has dragged a joint to a new angle.
     JointDragged {
         /// Its number, 1 to 7.
@@ -58,18 +58,18 @@ enum Grab {
 pub struct Pointer {
     down: Vec<(i32, Vec2)>,
     grab: Option<Grab>,
-    hovered: Option<Part>,
+    hovered: Option<ArmPart>,
 }
 
 impl Pointer {
     /// The part of an arm with these angles under a pixel. The tip takes precedence within 16 CSS pixels.
     #[must_use]
-    pub fn part_at(arm: &Arm, camera: &Camera, angles: Angles, at: Vec2) -> Option<Part> {
+    pub fn part_at(arm: &ArmMeshes, camera: &Camera, angles: Angles, at: Vec2) -> Option<ArmPart> {
         let is_tip = camera.project(tip_of(angles)).is_some_and(|tip| tip.distance(at) <= TIP_RADIUS);
         if is_tip {
-            return Some(Part::Tip);
+            return Some(ArmPart::Tip);
         }
-        arm.pick(angles, camera.ray(at)).map(|hit| Part::of(hit.body))
+        arm.pick(angles, camera.ray(at)).map(|hit| ArmPart::of(hit.body))
     }
 
     /// Is a joint or the tip being dragged?
@@ -82,7 +82,7 @@ impl Pointer {
     pub fn down(
         &mut self,
         (id, at, button): (i32, Vec2, Button),
-        arm: &Arm,
+        arm: &ArmMeshes,
         camera: &Camera,
         angles: Angles,
     ) -> Option<SceneEvent> {
@@ -103,7 +103,7 @@ impl Pointer {
     pub fn moved(
         &mut self,
         (id, at): (i32, Vec2),
-        arm: &Arm,
+        arm: &ArmMeshes,
         camera: &mut Camera,
         angles: Angles,
     ) -> Option<SceneEvent> {
@@ -143,7 +143,7 @@ impl Pointer {
         self.hover(None)
     }
 
-    fn hover(&mut self, part: Option<Part>) -> Option<SceneEvent> {
+    fn hover(&mut self, part: Option<ArmPart>) -> Option<SceneEvent> {
         let before = std::mem::replace(&mut self.hovered, part);
         (before != part).then_some(SceneEvent::Hovered(part))
     }
@@ -174,15 +174,15 @@ pub fn key(camera: &mut Camera, key: &str, shift: bool) -> bool {
     true
 }
 
-fn grab(arm: &Arm, camera: &Camera, angles: Angles, at: Vec2) -> Grab {
+fn grab(arm: &ArmMeshes, camera: &Camera, angles: Angles, at: Vec2) -> Grab {
     let joint = || {
         let hit = arm.pick(angles, camera.ray(at))?;
         JointDrag::start(hit, angles, camera, at).map(Grab::Joint)
     };
     let grabbed = match Pointer::part_at(arm, camera, angles, at) {
-        Some(Part::Tip) => TipDrag::start(angles, camera, at).map(Grab::Tip),
-        Some(Part::Joint(_)) => joint(),
-        Some(Part::Base) | None => None,
+        Some(ArmPart::Tip) => TipDrag::start(angles, camera, at).map(Grab::Tip),
+        Some(ArmPart::Joint(_)) => joint(),
+        Some(ArmPart::Base) | None => None,
     };
     grabbed.unwrap_or(Grab::Orbit)
 }
@@ -203,8 +203,8 @@ mod tests {
 
     const POSE: Angles = [90.0, 115.0, 65.0, 90.0, 90.0, 90.0, 40.0];
 
-    fn stage() -> (Pointer, Arm, Camera) {
-        (Pointer::default(), Arm::default(), Camera::default())
+    fn stage() -> (Pointer, ArmMeshes, Camera) {
+        (Pointer::default(), ArmMeshes::default(), Camera::default())
     }
 
     fn on_rear_arm(camera: &Camera) -> Vec2 {
@@ -216,7 +216,7 @@ mod tests {
     fn a_part_is_hovered_once_and_left_once() {
         let (mut pointer, arm, mut camera) = stage();
         let at = on_rear_arm(&camera);
-        let hovered = Some(SceneEvent::Hovered(Some(Part::Joint(2))));
+        let hovered = Some(SceneEvent::Hovered(Some(ArmPart::Joint(2))));
         assert_eq!(pointer.moved((1, at), &arm, &mut camera, POSE), hovered);
         assert_eq!(pointer.moved((1, at + Vec2::X), &arm, &mut camera, POSE), None);
         assert_eq!(pointer.left(), Some(SceneEvent::Hovered(None)));
@@ -242,7 +242,7 @@ mod tests {
     fn the_tip_is_dragged_even_where_another_part_covers_it() {
         let (mut pointer, arm, mut camera) = stage();
         let at = camera.project(tip_of(POSE)).expect("in front");
-        assert_eq!(Pointer::part_at(&arm, &camera, POSE, at), Some(Part::Tip));
+        assert_eq!(Pointer::part_at(&arm, &camera, POSE, at), Some(ArmPart::Tip));
         pointer.down((1, at, Button::Primary), &arm, &camera, POSE);
         let event = pointer.moved((1, at + Vec2::new(0.0, 15.0)), &arm, &mut camera, POSE);
         let Some(SceneEvent::TipDragged(wish)) = event else { panic!("{event:?}") };

@@ -11,7 +11,7 @@ use glam::{Mat4, Vec3, Vec4};
 use wasm_bindgen::JsValue;
 use web_sys::{WebGl2RenderingContext as Gl, WebGlBuffer, WebGlProgram, WebGlVertexArrayObject};
 
-use super::arm::{Angles, Arm, BODIES, Part, tip_of, transforms};
+use super::arm::{Angles, ArmMeshes, ArmPart, BODIES, tip_of, transforms};
 use super::camera::Camera;
 use super::lines::{LineEnd, Lines, TABLE};
 use super::shaders;
@@ -64,7 +64,7 @@ impl Renderer {
     ///
     /// # Errors
     /// The graphics driver reports an error, whose message is returned.
-    pub fn new(gl: Gl, arm: &Arm) -> Result<Self, JsValue> {
+    pub fn new(gl: Gl, arm: &ArmMeshes) -> Result<Self, JsValue> {
         let layer =
             |vertex, fragment, attributes: &[(&str, i32)]| Layer::new(&gl, vertex, fragment, attributes);
         let of_arm = layer(
@@ -126,10 +126,10 @@ impl Renderer {
         arm.set_colour(gl, "shell", palette.shell);
         arm.set_colour(gl, "dark", palette.dark);
         arm.set_colour(gl, "highlight", palette.hover);
-        let accents = Body::ALL.map(|body| accent(view, palette, Part::of(body)));
+        let accents = Body::ALL.map(|body| accent(view, palette, ArmPart::of(body)));
         let highlights = Body::ALL.map(|body| {
-            let part = Part::of(body);
-            if view.hovered == Some(part) && part != Part::Base { HIGHLIGHT } else { 0.0 }
+            let part = ArmPart::of(body);
+            if view.hovered == Some(part) && part != ArmPart::Base { HIGHLIGHT } else { 0.0 }
         });
         gl.uniform1fv_with_f32_array(arm.uniform(gl, "highlights").as_ref(), &highlights);
         gl.uniform4fv_with_f32_array(arm.uniform(gl, "accents").as_ref(), accents.as_flattened());
@@ -209,7 +209,7 @@ impl Renderer {
         if let Some(wish) = view.unreachable {
             marker(wish, palette.unreachable, WISH_SIZE, true);
         }
-        let size = if view.hovered == Some(Part::Tip) { WISH_SIZE } else { TIP_SIZE };
+        let size = if view.hovered == Some(ArmPart::Tip) { WISH_SIZE } else { TIP_SIZE };
         marker(tip_of(view.measured), palette.tip, size, false);
     }
 }
@@ -272,10 +272,10 @@ impl Layer {
 }
 
 /// The colour of a part's joint, and its weight in the part's shell. The weight is larger for a joint that does not work.
-fn accent(view: &View, palette: &Palette, part: Part) -> [f32; 4] {
+fn accent(view: &View, palette: &Palette, part: ArmPart) -> [f32; 4] {
     let colour = match part {
-        Part::Joint(joint) => view.colours.get(usize::from(joint).wrapping_sub(1)).copied(),
-        Part::Base | Part::Tip => None,
+        ArmPart::Joint(joint) => view.colours.get(usize::from(joint).wrapping_sub(1)).copied(),
+        ArmPart::Base | ArmPart::Tip => None,
     };
     let [red, green, blue] = colour.unwrap_or(palette.shell).floats();
     let weight = if colour == Some(palette.joint_ok) { SHELL_WEIGHT } else { SHELL_WEIGHT_ELSE };
@@ -284,7 +284,7 @@ fn accent(view: &View, palette: &Palette, part: Part) -> [f32; 4] {
 
 /// The distinct corners of the arm in the layout of the arm's program, and their indices in the order of the triangles. So a
 /// corner that several triangles share is stored only once.
-fn corners(arm: &Arm) -> (Vec<[f32; CORNER]>, Vec<u16>) {
+fn corners(arm: &ArmMeshes) -> (Vec<[f32; CORNER]>, Vec<u16>) {
     let (mut corners, mut indices, mut known) = (Vec::new(), Vec::new(), HashMap::new());
     for (number, (_, mesh)) in (0_u8..).zip(arm.meshes()) {
         for ((&[x, y, z], &[u, v, w]), finish) in mesh.positions.iter().zip(&mesh.normals).zip(&mesh.finishes)
@@ -333,7 +333,7 @@ mod tests {
 
     #[test]
     fn shared_corners_are_kept_once_and_have_an_index() {
-        let arm = Arm::default();
+        let arm = ArmMeshes::default();
         let (corners, indices) = corners(&arm);
         let positions: Vec<[f32; 3]> =
             arm.meshes().iter().flat_map(|(_, mesh)| mesh.positions.iter().copied()).collect();

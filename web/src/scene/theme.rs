@@ -35,7 +35,7 @@ pub enum Theme {
 pub struct Palette {
     /// The background of the scene.
     pub background: Rgb,
-    /// The table under the arm, and the background of plots.
+    /// The table under the arm, the background of plots, and the rim of the tip's marker.
     pub table: Rgb,
     /// Lines of the grid in the scene and in plots, and walls without a colour in their name.
     pub grid: Rgb,
@@ -63,7 +63,7 @@ pub struct Palette {
     pub joint_fault: Rgb,
     /// A joint whose servo does not answer.
     pub joint_missing: Rgb,
-    /// Lines of joints 1 to 7 in plots.
+    /// Lines of joints 1 to 7 in plots, and things without a colour in their name.
     pub joints: [Rgb; 7],
 }
 

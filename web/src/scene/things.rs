@@ -7,7 +7,7 @@ use kinematics::Vector;
 
 use super::lines::LineEnd;
 use super::theme::{Palette, Rgb};
-use super::view::Thing;
+use super::view::DrawnThing;
 
 /// The number of corners of the outline of a cylinder.
 const SIDES: u16 = 24;
@@ -25,15 +25,15 @@ const LIGHT: Vec3 = Vec3::new(0.25, -0.45, 0.85);
 
 /// Converts the walls and things of a room for the view.
 #[must_use]
-pub fn things(world: &World) -> Vec<Thing> {
+pub fn things(world: &World) -> Vec<DrawnThing> {
     let table = world.scene().table;
     let walls = world.scene().walls.iter().map(|wall| of_wall(wall, table));
     walls.chain(world.objects().iter().map(of_object)).collect()
 }
 
-fn of_wall(&Block { at: [x, y], size: [width, depth, height], ref name }: &Block, table: f64) -> Thing {
+fn of_wall(&Block { at: [x, y], size: [width, depth, height], ref name }: &Block, table: f64) -> DrawnThing {
     let half = |direction: Vec3, size: f64| direction * single(size / 2.0);
-    Thing {
+    DrawnThing {
         middle: vector(Vector::new(x, y, table + height / 2.0)),
         axes: [half(Vec3::X, width), half(Vec3::Y, depth), half(Vec3::Z, height)],
         is_round: false,
@@ -42,14 +42,14 @@ fn of_wall(&Block { at: [x, y], size: [width, depth, height], ref name }: &Block
     }
 }
 
-fn of_object(object: &Object) -> Thing {
+fn of_object(object: &Object) -> DrawnThing {
     let (is_round, [x, y, z]) = match object.item.form {
         Form::Cube { edge } => (false, [edge; 3]),
         Form::Cylinder { diameter, height } => (true, [diameter, diameter, height]),
     };
     let frame = &object.frame;
     let half = |axis: Vector<f64>, size: f64| vector(axis * (size / 2.0));
-    Thing {
+    DrawnThing {
         middle: vector(frame.origin),
         axes: [half(frame.x, x), half(frame.y, y), half(frame.z, z)],
         is_round,
@@ -73,7 +73,7 @@ const fn single(value: f64) -> f32 {
 
 /// The triangles of the things: three corners each, counter-clockwise when seen from outside.
 #[must_use]
-pub fn triangles(things: &[Thing], palette: &Palette) -> Vec<LineEnd> {
+pub fn triangles(things: &[DrawnThing], palette: &Palette) -> Vec<LineEnd> {
     let mut corners = Vec::new();
     for (thing, own) in things.iter().zip(palette.joints.iter().cycle()) {
         let colour = thing.named.unwrap_or(if thing.is_wall { palette.grid } else { *own });
@@ -93,7 +93,7 @@ fn circle() -> Vec<Vec2> {
 }
 
 /// Adds a prism with this outline, whose corners are in counter-clockwise order.
-fn add(corners: &mut Vec<LineEnd>, thing: &Thing, outline: &[Vec2], colour: Rgb) {
+fn add(corners: &mut Vec<LineEnd>, thing: &DrawnThing, outline: &[Vec2], colour: Rgb) {
     let [x, y, z] = thing.axes;
     let at = |edge: Vec2, height: f32| thing.middle + x * edge.x + y * edge.y + z * height;
     let next = outline.iter().cycle().skip(1);

@@ -2,12 +2,12 @@
 
 use glam::Vec3;
 
-use super::arm::{Angles, Part};
+use super::arm::{Angles, ArmPart};
 use super::theme::{Rgb, Theme};
 
 /// A box or cylinder in the scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Thing {
+pub struct DrawnThing {
     /// Its middle, in mm.
     pub middle: Vec3,
     /// Its axes. The length of each one is half of the size along it, in mm.
@@ -32,9 +32,9 @@ pub struct View {
     /// A wanted position of the tip, in mm, to which the arm does not go: out of reach, or refused by the guard of the workspace.
     pub unreachable: Option<Vec3>,
     /// The walls, the things on the table, and the thing that the arm carries.
-    pub things: Vec<Thing>,
+    pub things: Vec<DrawnThing>,
     /// The part under the pointer; `None` if the pointer is over no part.
-    pub hovered: Option<Part>,
+    pub hovered: Option<ArmPart>,
     /// The theme of the page: light or dark.
     pub theme: Theme,
 }

@@ -13,9 +13,9 @@ use super::{LineState, Source};
 const BAUD: u32 = 115_200;
 
 /// A serial port of this computer.
-pub struct SerialSource(Rc<RefCell<Port>>);
+pub struct SerialSource(Rc<RefCell<SerialPort>>);
 
-struct Port {
+struct SerialPort {
     received: Vec<u8>,
     state: LineState,
     port: Option<JsValue>,
@@ -30,8 +30,13 @@ impl SerialSource {
     pub fn ask() -> Option<Self> {
         let navigator = web_sys::window()?.navigator();
         let serial = get(&navigator, "serial").filter(JsValue::is_object)?;
-        let port =
-            Port { received: Vec::new(), state: LineState::Opening, port: None, writer: None, reader: None };
+        let port = SerialPort {
+            received: Vec::new(),
+            state: LineState::Opening,
+            port: None,
+            writer: None,
+            reader: None,
+        };
         let port = Rc::new(RefCell::new(port));
         let shared = Rc::clone(&port);
         spawn_local(async move {
@@ -44,7 +49,7 @@ impl SerialSource {
 }
 
 /// Opens a port, and stores the received bytes until the port closes.
-async fn run(serial: &JsValue, shared: &Rc<RefCell<Port>>) -> Result<(), JsValue> {
+async fn run(serial: &JsValue, shared: &Rc<RefCell<SerialPort>>) -> Result<(), JsValue> {
     let port = call(serial, "requestPort", &[])?.await?;
     let options = Object::new();
     Reflect::set(&options, &"baudRate".into(), &BAUD.into())?;

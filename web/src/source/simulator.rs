@@ -77,7 +77,7 @@ mod tests {
     use super::*;
     use crate::arm_state::target_frame;
     use crate::client::Client;
-    use crate::movement::{PlayFailure, PlayProgress, Player};
+    use crate::movement::{PagePlayer, PlayFailure, PlayProgress};
     use crate::preview::exchange;
     use crate::stop::StopProgress;
     use sevenbot::map::{SET_POINT_PERIOD, SPEED, WATCHDOG_ACTION};
@@ -141,7 +141,7 @@ mod tests {
         mut during: impl FnMut(u32, &mut SimulatedSource),
     ) -> PlayProgress {
         let movement = "7bot-recording 2\n0 90 90 65 90 90 90 80 0\n3 120 90 65 90 90 90 80 1\n";
-        let mut player = Player::new(movement, client.registers(), None, arm.now()).expect("a recording");
+        let mut player = PagePlayer::new(movement, client.registers(), None, arm.now()).expect("a recording");
         for pictures in 0..1_000 {
             during(pictures, arm);
             match player.poll(arm.now(), client) {

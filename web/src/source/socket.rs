@@ -12,14 +12,14 @@ use super::{LineState, Source};
 /// A line over a WebSocket to the server that the page came from.
 pub struct SocketSource {
     socket: WebSocket,
-    shared: Rc<RefCell<Shared>>,
+    shared: Rc<RefCell<SocketState>>,
     // Kept, because the browser calls these closures until the socket is dropped.
     _message: Closure<dyn FnMut(MessageEvent)>,
     _close: Closure<dyn FnMut(CloseEvent)>,
 }
 
 #[derive(Default)]
-struct Shared {
+struct SocketState {
     received: Vec<u8>,
     closed: Option<String>,
 }
@@ -41,7 +41,7 @@ impl SocketSource {
     pub fn connect_with(query: &str) -> Result<Self, JsValue> {
         let socket = WebSocket::new(&address("frames", query)?)?;
         socket.set_binary_type(BinaryType::Arraybuffer);
-        let shared = Rc::new(RefCell::new(Shared::default()));
+        let shared = Rc::new(RefCell::new(SocketState::default()));
         let inbox = Rc::clone(&shared);
         let message = Closure::<dyn FnMut(MessageEvent)>::new(move |event: MessageEvent| {
             if let Ok(buffer) = event.data().dyn_into::<js_sys::ArrayBuffer>() {

@@ -251,7 +251,7 @@ impl ImageAddresses {
         median(paths, "a request that nothing disturbs")
     }
 
-    /// The instructions in one log. `None` if the arm was awake or another event came in between.
+    /// The instructions in one log. `None` if the arm was awake, another event came in between, or the log ends before `end`.
     fn path(&self, events: &[TraceEvent], end: impl Fn(&TraceEvent) -> bool) -> Option<u64> {
         let byte = events.iter().position(|event| *event == TraceEvent::Read(HOST_DATA))?;
         let is_entry = |event: &TraceEvent| trace::is_step_at(event, self.host_interrupt);
@@ -323,8 +323,8 @@ impl ImageAddresses {
     }
 }
 
-/// Sends a request, and logs the arm from one of its bytes on. The arm sleeps when this byte arrives. `from_last` is 1 for
-/// the last byte.
+/// Sends a request, and logs how the arm processes one of its bytes. The arm usually sleeps when this byte arrives.
+/// `from_last` is 1 for the last byte.
 fn send_and_watch(
     image: &mut LoggedImage,
     request: Request<'_>,

@@ -22,7 +22,7 @@ pub(super) fn archive_name(release: &Release, platform: Platform) -> String {
     release.name("sevenbot", &format!("-{}.{tail}", platform.name))
 }
 
-/// The name of the file with the licences of all parts.
+/// The name of the file with the licences of the parts that others wrote.
 pub(super) fn licences_name(release: &Release) -> String {
     release.name("sevenbot", "-licences.txt")
 }

@@ -1,4 +1,4 @@
-//! The licences of all crates that are part of a release, with the texts that their packages hold.
+//! The licences of the crates of crates.io in a release, and of Blockly, with the texts that their packages hold.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -16,7 +16,7 @@ const LICENCE_FILES: [&str; 6] = ["copying", "copyright", "licence", "license", 
 /// The line between two parts of the text.
 const RULE: &str = "\n================================================================================\n";
 
-/// The list of the released crates, and each text of a licence once.
+/// The list of these crates and Blockly, and each text of a licence once.
 pub(super) fn text() -> TaskResult<String> {
     let Metadata { packages, resolve } = metadata(&["--locked"])?;
     let is_released = |package: &&Package| RELEASED.contains(&package.name.as_str());

@@ -68,7 +68,7 @@ pub(super) fn make_native() -> TaskResult<PathBuf> {
     Ok(release.folder)
 }
 
-/// Writes the archive and the package of a system.
+/// Writes the archive of a system, and for Linux the package.
 fn pack(release: &Release, platform: Platform, built: &Path, common: &CommonFiles) -> TaskResult {
     let files = tree::files(platform, built, common)?;
     let folder = release.name("sevenbot", &format!("-{}", platform.name));
@@ -78,7 +78,7 @@ fn pack(release: &Release, platform: Platform, built: &Path, common: &CommonFile
     debian::write(release, platform, &files)
 }
 
-/// Writes the note and the sums.
+/// Writes the note, and then the sums of all files.
 fn finish(release: &Release) -> TaskResult {
     fs::write(release.path(NOTE), release.note())?;
     sums::write(&release.folder)

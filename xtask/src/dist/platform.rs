@@ -9,7 +9,7 @@ use super::release::Release;
 use super::tools;
 use crate::run::{TaskResult, root, run_command, target_directory};
 
-/// The profile of all programs and modules of a release.
+/// The profile of the programs and the Python module of a release. The page and the image have their own profiles.
 pub(super) const PROFILE: &str = "dist";
 /// The oldest version of the C library with which Linux programs run: of the year 2012, as in `manylinux2014`.
 const GLIBC: &str = "2.17";
@@ -45,7 +45,7 @@ pub(super) const WINDOWS: Platform =
 pub(super) const PLATFORMS: [Platform; 3] = [LINUX_X86_64, LINUX_AARCH64, WINDOWS];
 
 impl Platform {
-    /// The programs for this system. `host-sim` needs pseudo-terminals, so it is for Linux only.
+    /// The programs for this system. `host-sim` needs pseudo-terminals, so there is none for Windows.
     pub(super) fn programs(self) -> &'static [&'static str] {
         if self.debian.is_some() { &["host-sim", "sevenbot"] } else { &["sevenbot.exe"] }
     }

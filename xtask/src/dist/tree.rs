@@ -1,4 +1,4 @@
-//! The files of an installation, below `/usr`, `/usr/local` or `~/.local`.
+//! The files of an installation: on Linux, below `/usr`, `/usr/local` or `~/.local`.
 //!
 //! ```text
 //!   bin/                             sevenbot, host-sim
@@ -43,7 +43,7 @@ pub(super) struct CommonFiles {
 }
 
 impl CommonFiles {
-    /// `program`: a `sevenbot` that runs on this computer. `licences`: the licences of all parts.
+    /// `program`: a `sevenbot` that runs on this computer. `licences`: the licences of the parts that others wrote.
     pub(super) fn new(program: &Path, licences: &str) -> TaskResult<Self> {
         let mut linux = man_pages(program)?;
         for (shell, path) in COMPLETIONS {

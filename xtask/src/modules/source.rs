@@ -162,8 +162,8 @@ fn skip_colons(tokens: &mut Tokens) -> bool {
     tokens.next_if(is_joint).is_some() && tokens.next_if(is_colon).is_some()
 }
 
-/// Skips an attribute, and the item behind it if the item is a test or in a file outside the crate. Returns whether there was an
-/// attribute.
+/// Skips an attribute, and the item behind it if the attribute is `cfg(test)`, or a `path`, which names a file outside the crate.
+/// Returns whether there was an attribute.
 fn skip_test(tokens: &mut Tokens) -> bool {
     let Some(TokenTree::Group(attribute)) = tokens.next_if(|token| matches!(token, TokenTree::Group(_)))
     else {

@@ -7,7 +7,7 @@ use std::path::{Path as FilePath, PathBuf};
 use super::source::{Path, SourceFile};
 use crate::run::TaskResult;
 
-/// The largest number of imports to follow for one path.
+/// The largest number of paths to follow for one path: itself, and those of imports.
 const MAX_IMPORTS: usize = 16;
 
 /// The path of a module from the crate's root, which has an empty path.
@@ -60,7 +60,7 @@ impl Tree {
         uses
     }
 
-    /// The module with the item at the end of a path in `module`; `None` for items of other crates.
+    /// The module with the item at the end of a path in `module`; `None` if the path leads to no module of this crate.
     fn resolve(&self, module: &Module, path: &Path, imports_left: usize) -> Option<Module> {
         let imports_left = imports_left.checked_sub(1)?;
         let (first, mut rest) = path.split_first()?;

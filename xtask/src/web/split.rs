@@ -6,9 +6,10 @@
 //!     └── a table, in which the rest enters its functions
 //! ```
 //!
-//! For each function of the rest that the first part calls, the first part contains a short function. That function calls
-//! `need_rest` of the page, which loads the rest if necessary. Then it calls the function that the rest has entered in the
-//! table. So every choice of functions works. A good choice lets the first picture appear before the rest is loaded.
+//! For each function of the rest that the first part or the page calls, the first part contains a short function. That function
+//! calls `need_rest` of the page, which loads the rest if necessary. Then it calls the function that the rest has entered in the
+//! table. So every choice works that leaves `need_rest` in the first part. A good choice lets the first picture appear before the
+//! rest is loaded.
 
 use std::collections::HashSet;
 
@@ -238,7 +239,7 @@ fn make_rest(module: &mut Module, is_later: &[bool], is_entry: &[bool], start: u
     Ok(())
 }
 
-/// Removes the start function, the exports, the imports, the data and the elements, which only the first part has.
+/// Removes the start function, the exports, the imports, the data and the elements, which only the first part keeps.
 fn clear(module: &mut Module) {
     module.start = None;
     let exports: Vec<_> = module.exports.iter().map(Export::id).collect();

@@ -27,8 +27,8 @@ fn duration_ms(motor: &mut Motor) -> u32 {
     panic!("the motor does not arrive");
 }
 
-fn goal(position_counts: u16, time_ms: u16, speed: u16) -> Goal {
-    Goal { position_counts, time_ms, speed }
+fn goal(position_counts: u16, time_ms: u16, speed: u16) -> ServoGoal {
+    ServoGoal { position_counts, time_ms, speed }
 }
 
 fn assert_takes(motor: &mut Motor, millis: u32) {

@@ -62,7 +62,7 @@ fn each_servo_uses_its_own_item_of_a_sync_write() {
     };
     let mut servo = ServoRegisters::new(2);
     assert!(answer(&mut servo, goals).is_empty());
-    let goal = Goal { position_counts: 258, time_ms: 12, speed: 534 };
+    let goal = ServoGoal { position_counts: 258, time_ms: 12, speed: 534 };
     assert_eq!(servo.goal(), goal);
     assert_eq!(servo.take_new_goal(), Some(goal));
     assert_eq!(servo.take_new_goal(), None, "one write, one move");

@@ -1,4 +1,4 @@
-//! The whole controller, called as the firmware calls it.
+//! The whole controller, called as the main loop of the firmware calls it, without its sleep and its log.
 
 #![no_std]
 #![no_main]

@@ -13,7 +13,7 @@ use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::process::{Pid, Signal, kill_process};
 use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 
-/// The time limit of all waits: long enough for a slow and busy machine.
+/// The time limit of each repeated check: long enough for a slow and busy machine.
 const PATIENCE: Duration = Duration::from_secs(60);
 
 /// A running simulator. Dropping it kills the process.

@@ -92,7 +92,7 @@ pub struct Tally {
     pub worst_delay_us: u64,
 }
 
-/// Sends at least `frames` good frames, in bursts, with a disturbance before each burst.
+/// Sends at least `frames` good frames, in bursts, with the disturbance, if there is one, before or inside each burst.
 pub fn run(disturbance: Disturbance, seed: u64, frames: usize) -> Tally {
     let mut random = Random::new(seed);
     let mut line = Line::new();

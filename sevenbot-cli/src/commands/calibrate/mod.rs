@@ -81,8 +81,8 @@ fn read(arm: &mut Arm) -> Result<Offsets, CommandError> {
     Ok(arm.read_span(Span::of(&OFFSET))?.into())
 }
 
-/// If the offsets differ, asks for confirmation, writes them, and checks them over a restart; with `--yes` it neither asks
-/// nor checks. Then prints the offsets.
+/// If the offsets differ, asks for confirmation, writes them, and checks them over a restart; with `--yes` there is neither a
+/// question nor a restart. Then prints the offsets.
 fn store(
     session: &mut Session,
     mut arm: Arm,

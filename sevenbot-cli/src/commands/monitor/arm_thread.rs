@@ -230,7 +230,7 @@ fn jog_tip(
     arm.end_abandoned_stream()?;
     let joints = arm.wait_until_settled()?;
     for joint in Joint::ALL {
-        // Fails if the position of a joint is unknown.
+        // Fails if the joint does not answer, or may still have its target of power-up.
         step_target(&joints, joint, 0)?;
     }
     let targets = joints.targets().map(Angle::from_register);

@@ -1,4 +1,4 @@
-//! The keys of the monitor: each changes the view or sends a command.
+//! The keys of the monitor: they change the view, send commands, or end the monitor.
 
 use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use sevenbot::Joint;
@@ -98,7 +98,7 @@ fn press_in_dialog(view: &mut MonitorView, dialog: Dialog, key: KeyCode) -> KeyA
     }
 }
 
-/// Asks for confirmation, because the arm may fall.
+/// Asks for confirmation, because the arm may sink or fall.
 fn release(view: &mut MonitorView, state: u8) -> KeyAction {
     view.dialog = Some(Dialog::ConfirmState(state));
     KeyAction::Redraw
@@ -110,7 +110,7 @@ fn select(view: &mut MonitorView, number: i16) {
     }
 }
 
-/// Shows the next quantity in the plot, if the arm measures it.
+/// Shows the next quantity in the plot, unless the arm is known to measure positions only.
 fn change_plot(view: &mut MonitorView) {
     if view.sample.as_ref().is_some_and(|sample| sample.fine.is_none()) {
         view.show_note("this arm's firmware measures no velocities and loads");

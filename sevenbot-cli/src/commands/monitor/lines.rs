@@ -16,7 +16,7 @@ use crate::printer::Printable;
 pub(crate) enum LineFormat {
     /// Seconds, seven targets, seven positions, and the moving joints.
     Columns,
-    /// All values, separated by commas.
+    /// Also speeds, status and measured values, separated by commas.
     Csv,
 }
 

@@ -110,7 +110,7 @@ pub(super) fn each_sample(
     let (mut due, mut told) = (start, Vec::new());
     for _ in 0..count {
         sleep(due.saturating_duration_since(Instant::now()));
-        // After a late sample the next period begins now, instead of catching up.
+        // If a sample is more than a period late, the next one is due now: missed samples are not made up for.
         due = (due + period).max(Instant::now());
         let sample = ArmSample::take(arm, start);
         if Interrupt::is_requested() {

@@ -95,7 +95,7 @@ fn show(
     Ok(())
 }
 
-/// Waits for input. Returns false if the terminal is gone, because crossterm would then read end-of-file in a loop.
+/// Waits for input. Returns false if standard input is a terminal that is gone: crossterm would then read end-of-file in a loop.
 #[cfg(unix)]
 fn wait_for_input(timeout: Duration, reads_stdin: bool) -> io::Result<bool> {
     use rustix::event::{PollFd, PollFlags, Timespec, poll};
@@ -124,7 +124,7 @@ fn react(view: &mut MonitorView, event: &Event, commands: &Sender<UiCommand>) ->
         // Some terminals also report key releases.
         Event::Key(key) if key.kind != KeyEventKind::Release => match press(view, *key) {
             KeyAction::Redraw => true,
-            // The thread ends only after this channel is closed, so sending succeeds.
+            // The thread ends after this channel is closed, or after a signal, which ends the monitor, too.
             KeyAction::Send(command) => commands.send(command).is_ok(),
             KeyAction::Quit => false,
             KeyAction::Stop => {

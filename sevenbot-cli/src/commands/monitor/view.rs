@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!   events from the arm ──▶ ┌──────┐
-//!                         │ View │ ──▶ draw: for a terminal, a test, or an SVG
+//!                         │ View │ ──▶ draw: for a terminal or a test
 //!   keys ─── keys.rs ───▶ └──────┘
 //!               └──▶ commands to the arm
 //! ```
@@ -109,7 +109,7 @@ pub(crate) struct LinkQuality {
     pub(crate) unanswered: u64,
     /// Damaged frames received instead of an answer.
     pub(crate) damaged: usize,
-    /// The arm's counter of damaged frames: at the first sample, and now.
+    /// The arm's counter of damaged frames: at the first sample of this connection, and now.
     corrupted: Option<(u16, u16)>,
     /// Mean round-trip time of about the last ten samples, in milliseconds.
     pub(crate) round_trip_ms: f64,
@@ -222,7 +222,7 @@ impl MonitorView {
         (self.clock < *since + NOTE_DURATION).then_some(note)
     }
 
-    /// The last sample, while the arm is connected.
+    /// The last sample, or the frozen one, while the arm is connected.
     pub(crate) fn arm(&self) -> Option<&ArmSample> {
         self.sample.as_ref().filter(|_| matches!(self.connection, LinkState::Open { .. }))
     }

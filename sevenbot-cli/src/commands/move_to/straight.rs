@@ -25,7 +25,8 @@ pub(super) fn run(session: &mut Session, args: &MoveToArgs) -> Result<(), Comman
     let joints = if args.dry_run { arm.wait_until_settled()? } else { arm.driven_joints()? };
     let start = LineStart::of(&mut arm, &joints)?;
     let tool = args.tool().unwrap_or_else(|| TipPose::of_fine(start.targets).tool);
-    // Only the error of this check names the nearest reachable point and another direction of the tool.
+    // The error of this check names the point nearest to the end, and another direction of the tool. The error of the line is about
+    // the point where the line breaks.
     target(args, tool)?;
     let line = start.line_to(args.tip(), tool, args.speed);
     let request = StraightLineRequest { guard: args.guard.guard(), ..line };

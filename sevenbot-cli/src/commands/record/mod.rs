@@ -1,13 +1,13 @@
 //! `record`: writes the positions of a guided or moving arm to a file.
 //!
 //! ```text
-//!   arm ── reports ──▶ Recorder (time of measurement) ──▶ one line each ──▶ Outputs: text, MCAP
+//!   arm ── reports ──▶ Recorder (time of measurement) ──▶ one line each ──▶ RecordingOutputs: text, MCAP
 //!    │                  TeachPendant (keys: pump, nudges, end) ──┘              ▲
 //!    └── reads ───────▶ TelemetryReader (targets, velocities, loads, health) ───┘ MCAP only
 //! ```
 //!
-//! However the recording ends, the files hold whole moments only. Unless the program is killed, a guided arm that is still
-//! connected then holds its position.
+//! However the recording ends, the files hold whole moments only. Unless the program is killed or a second Ctrl-C ends it, a guided
+//! arm that is still connected then holds its position.
 
 mod outputs;
 mod teach_pendant;
@@ -27,7 +27,7 @@ use sevenbot::moves::{ConnectionLost, RecordedPose, Recorder};
 use sevenbot::recording::{FileVersion, Moment};
 use sevenbot::{Arm, Problem, Span};
 
-use self::outputs::{Outputs, is_stdout};
+use self::outputs::{RecordingOutputs, is_stdout};
 use self::teach_pendant::TeachPendant;
 use self::telemetry::TelemetryReader;
 use crate::command_error::CommandError;
@@ -92,7 +92,7 @@ pub(crate) struct RecordArgs {
 const POLL_PERIOD: Duration = Duration::from_millis(20);
 
 #[derive(Debug, Serialize)]
-struct Recorded {
+struct RecordSummary {
     #[serde(skip_serializing_if = "Option::is_none")]
     file: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -101,8 +101,8 @@ struct Recorded {
     seconds: f64,
 }
 
-impl Recorded {
-    fn of(args: &RecordArgs, outputs: &Outputs) -> Self {
+impl RecordSummary {
+    fn of(args: &RecordArgs, outputs: &RecordingOutputs) -> Self {
         let name = |path: &Option<PathBuf>| match path {
             Some(path) if is_stdout(path) => Some("standard output".to_owned()),
             path => path.as_ref().map(|path| path.display().to_string()),
@@ -112,14 +112,14 @@ impl Recorded {
     }
 }
 
-impl fmt::Display for Recorded {
+impl fmt::Display for RecordSummary {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         let files: Vec<&str> = self.file.iter().chain(&self.mcap).map(String::as_str).collect();
         write!(out, "{}: {} moments in {:.1} s", files.join(", "), self.moments, self.seconds)
     }
 }
 
-impl Printable for Recorded {
+impl Printable for RecordSummary {
     fn write_text(&self, out: &mut dyn Write) -> io::Result<()> {
         writeln!(out, "{self}")
     }
@@ -141,7 +141,7 @@ pub(crate) fn run(session: &mut Session, args: &RecordArgs) -> Result<(), Comman
         report_content::POSITIONS => FileVersion::Degrees,
         _ => FileVersion::Hundredths,
     };
-    let mut outputs = Outputs::open(args.file.as_deref(), args.mcap.as_deref(), version)?;
+    let mut outputs = RecordingOutputs::open(args.file.as_deref(), args.mcap.as_deref(), version)?;
     Interrupt::catch();
     let before = arm.joints()?;
     let baud = session.options.baud;
@@ -162,7 +162,7 @@ pub(crate) fn run(session: &mut Session, args: &RecordArgs) -> Result<(), Comman
         outputs.note_what_is_there();
     }
     done.and(held)?;
-    let recorded = Recorded::of(args, &outputs);
+    let recorded = RecordSummary::of(args, &outputs);
     if args.mcap.as_deref().is_some_and(is_stdout) {
         note(recorded);
         return Ok(());
@@ -210,7 +210,7 @@ fn record_reports(
     arm: &mut Arm,
     args: &RecordArgs,
     (content, baud): (u8, u32),
-    outputs: &mut Outputs,
+    outputs: &mut RecordingOutputs,
 ) -> Result<(), CommandError> {
     let vacuum = arm.read_span(Span::of(&VACUUM_PUMP))?.byte(&VACUUM_PUMP) != 0;
     let mut pendant = TeachPendant::new(arm.targets()?, vacuum, args.driven);

@@ -17,19 +17,19 @@ use crate::printer::note;
 const REPLACE: ForceArg = ForceArg { force: true };
 
 /// The files of a recording. All of them get the same moments.
-pub(crate) struct Outputs {
+pub(crate) struct RecordingOutputs {
     lines: RecordingLines,
     /// The moments in the files, and the time of the last one.
     written: (u64, Duration),
     /// The files until the first moment. So existing ones keep their content if nothing is recorded.
-    opened: Option<Opened>,
+    opened: Option<OpenedFiles>,
     text: Option<LineFile>,
     mcap: Option<McapFile>,
     /// The wall-clock time to which the times of the moments are added, since 1970. Set when the first moment is added.
     start: Option<Duration>,
 }
 
-struct Opened {
+struct OpenedFiles {
     text: Option<OutputFile>,
     mcap: Option<McapOutput>,
 }
@@ -44,7 +44,7 @@ struct McapFile {
     writer: McapWriter<Box<dyn Write>>,
 }
 
-impl Outputs {
+impl RecordingOutputs {
     /// Opens the files, which may replace existing ones.
     pub(crate) fn open(
         text: Option<&Path>,
@@ -57,7 +57,7 @@ impl Outputs {
             return Err(CommandError::file(mcap, "the text and the MCAP recording need two files"));
         }
         let text = text.map(|path| OutputFile::open(path, None, REPLACE)).transpose()?;
-        let opened = Some(Opened { text, mcap: mcap.map(McapOutput::open).transpose()? });
+        let opened = Some(OpenedFiles { text, mcap: mcap.map(McapOutput::open).transpose()? });
         Ok(Self {
             lines: RecordingLines::new(version),
             written: (0, Duration::ZERO),
@@ -69,7 +69,7 @@ impl Outputs {
     }
 
     /// Empties the files, and writes their heads.
-    fn begin(&mut self, Opened { text, mcap }: Opened) -> Result<(), CommandError> {
+    fn begin(&mut self, OpenedFiles { text, mcap }: OpenedFiles) -> Result<(), CommandError> {
         self.mcap = mcap.map(McapFile::begin).transpose()?;
         self.text = text.map(LineFile::begin).transpose()?;
         self.text.as_mut().map_or(Ok(()), |file| file.add(&self.lines.head()))

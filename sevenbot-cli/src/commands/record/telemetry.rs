@@ -14,12 +14,12 @@ const REGISTERS: Span = Span::between(&FINE_TARGET, &LOAD);
 const BITS: u32 = 10 * (7 + 7 + REGISTERS.count() as u32);
 /// Reads of targets, velocities and loads use the line for at most 1 / `SHARE_OF_LINE` of the time.
 const SHARE_OF_LINE: u32 = 2;
-/// The time between two reads of the health, which has more registers.
+/// The shortest time between two reads of the health, which has more registers.
 const HEALTH_PERIOD: Duration = Duration::from_secs(1);
 /// A read of the health takes at most as long on the line as this many reads of the telemetry.
 const ANSWERS_PER_HEALTH: u32 = 4;
 
-/// Reads targets, velocities and loads, and the health once a second.
+/// Reads targets, velocities and loads, and the health at most once a second.
 pub(crate) struct TelemetryReader {
     /// Do the motors follow the targets?
     is_driven: bool,

@@ -1,4 +1,4 @@
-//! `servo`: single servos through an adapter on the servo bus, without the arm's controller. One file per subcommand.
+//! `servo`: single servos through an adapter on the servo bus, without the arm's controller.
 
 mod center;
 mod info;

@@ -48,7 +48,7 @@ pub(super) fn open(session: &Session, baud: u32) -> Result<BusMaster, CommandErr
     BusMaster::open(&port, baud, options).map_err(|error| CommandError::Open { port, error })
 }
 
-/// The error of a failed exchange. If no servo answered, checks whether the port is an arm's host link. Tries only the --baud
+/// The error of a failed exchange. If no frame was received, checks whether the port is an arm's host link. Tries only the --baud
 /// of this command: all rates would take seconds.
 pub(super) fn exchange_error(session: &Session, bus: BusMaster, error: ServoError) -> CommandError {
     let is_silent = matches!(

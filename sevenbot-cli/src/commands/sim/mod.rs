@@ -71,7 +71,7 @@ enum SimCommand {
     /// Switch the power of the arm.
     Power {
         /// 'off' loses what is in RAM, and loaded joints fall; 'cycle' is off and on.
-        to: Power,
+        to: PowerArg,
     },
     /// Restart the controller, as its watchdog does. The servos keep power, torque and goals.
     Restart,
@@ -186,7 +186,7 @@ struct TripArgs {
     joint: u8,
     /// The alarm.
     #[arg(default_value = "overload")]
-    alarm: Alarm,
+    alarm: AlarmArg,
 }
 
 /// Let virtual time pass as fast as possible, and wait for its end.
@@ -226,7 +226,7 @@ struct SnapshotArgs {
 
 #[derive(Clone, Copy, Debug, Serialize, ValueEnum)]
 #[serde(rename_all = "kebab-case")]
-enum Alarm {
+enum AlarmArg {
     /// The servo latches it.
     Overload,
     /// It lasts until the servo has cooled down.
@@ -235,7 +235,7 @@ enum Alarm {
 
 #[derive(Clone, Copy, Debug, Serialize, ValueEnum)]
 #[serde(rename_all = "kebab-case")]
-enum Power {
+enum PowerArg {
     On,
     Off,
     Cycle,

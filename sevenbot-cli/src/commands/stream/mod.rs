@@ -252,7 +252,7 @@ impl Streamer<'_, '_> {
         Ok(self.stream.approach(&way, &mut ProgressWatch::new(interrupt))?)
     }
 
-    /// Makes the next point due, as the first of the stream or after a pause.
+    /// Makes the next point due, as the first of the stream, or after a pause or an approach.
     fn make_due(&mut self) {
         let now = self.now();
         if self.pace.counts().points == 0 {

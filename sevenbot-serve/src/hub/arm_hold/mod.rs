@@ -1,6 +1,6 @@
-//! The hub holds the arm by itself when the watchdog of a client acts ([D24](protocol_core::decisions#d24)), for a command to
-//! stop, and for a stop or a hold that comes too late or while the arm is silent. It also repeats a hold that an outage
-//! interrupted.
+//! The hub holds the arm by itself when the watchdog of a client acts and does not damp the motors
+//! ([D24](protocol_core::decisions#d24)), for a command to stop, and for a stop or a hold that comes too late or while the arm is
+//! silent. It also repeats a hold that an outage interrupted.
 //!
 //! ```text
 //!   read which joints are silent or move ──▶ none, and no stream: the arm holds
@@ -21,7 +21,7 @@ use protocol_core::registers::map::{
 use protocol_core::registers::{JOINTS, Joint, Register};
 use protocol_core::time::{Duration, Instant};
 
-use super::angles::{Angles, DEGREE, UNMEASURED, angles_in, limits_in};
+use super::angles::{DEGREE, JointAngles, UNMEASURED, angles_in, limits_in};
 use super::held_targets::HeldTargets;
 
 /// The hold has failed after this many replies that do not confirm it.
@@ -33,7 +33,7 @@ const REPEAT_PERIOD: Duration = Duration::from_millis(100);
 const MOST_REPEATS: u8 = 40;
 
 /// A frame to write: the first register, and the values.
-pub(crate) type Frame = (u8, Vec<u8>);
+pub(crate) type RegisterWrite = (u8, Vec<u8>);
 
 /// The value that is being restored once the arm holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,7 +58,7 @@ pub(crate) struct ArmHold {
     repeats: u8,
     /// Replies so far; while the hold restores, tries to restore the value.
     rounds: u8,
-    sent: Vec<Frame>,
+    sent: Vec<RegisterWrite>,
     /// Joints that a client held after the pending read was first sent, one bit each.
     held_meanwhile: u8,
     /// When to repeat the read that has no reply yet; `None`: the next read is due now.
@@ -116,7 +116,7 @@ impl ArmHold {
     }
 
     /// Notes that a client holds the joints that have a target here. What a pending read shows of them is out of date.
-    pub(crate) fn note_held(&mut self, targets: &Angles) {
+    pub(crate) fn note_held(&mut self, targets: &JointAngles) {
         let held = Joint::ALL.into_iter().zip(targets).filter(|(_, target)| target.is_some());
         self.held_meanwhile = held.fold(self.held_meanwhile, |bits, (joint, _)| bits | joint.bit());
     }
@@ -183,7 +183,7 @@ impl ArmHold {
         if self.is_fine { (&FINE_TARGET, &FINE_POSITION) } else { (&TARGET_POSITION, &PRESENT_POSITION) }
     }
 
-    /// Is this step over? Either it succeeded, or it was tried often enough.
+    /// Is this step over? Either the arm holds and nothing is being restored, or the step was tried often enough.
     pub(crate) const fn is_over(&self) -> bool {
         (self.is_done && self.restoring.is_none()) || self.rounds >= MOST_ROUNDS
     }
@@ -194,7 +194,7 @@ impl ArmHold {
     }
 
     /// Processes a reply, and returns the frames to write.
-    pub(crate) fn frames(&mut self, address: u8, values: &[u8], held: &HeldTargets) -> Vec<Frame> {
+    pub(crate) fn frames(&mut self, address: u8, values: &[u8], held: &HeldTargets) -> Vec<RegisterWrite> {
         self.repeat_at = None;
         self.rounds += 1;
         let Some(moving) = self.moving else {
@@ -206,7 +206,7 @@ impl ArmHold {
             self.is_done = moving == 0 && !self.is_streaming;
             return Vec::new();
         };
-        let is_taken = |(start, wanted): &Frame| {
+        let is_taken = |(start, wanted): &RegisterWrite| {
             let place = usize::from(start.saturating_sub(address));
             values.get(place..place + wanted.len()) == Some(wanted.as_slice())
         };
@@ -224,7 +224,13 @@ impl ArmHold {
     }
 
     /// One frame for each run of adjacent joints that get a target.
-    fn frames_that_hold(&self, moving: u8, address: u8, values: &[u8], held: &HeldTargets) -> Vec<Frame> {
+    fn frames_that_hold(
+        &self,
+        moving: u8,
+        address: u8,
+        values: &[u8],
+        held: &HeldTargets,
+    ) -> Vec<RegisterWrite> {
         let (targets, positions) = self.rows();
         let [present, measured] = [targets, positions].map(|row| angles_in(row, address, values));
         let mut wanted = [None; JOINTS];
@@ -262,8 +268,8 @@ impl ArmHold {
 }
 
 /// Joins writes to consecutive registers into one frame.
-pub(crate) fn joined(writes: impl Iterator<Item = Frame>) -> Vec<Frame> {
-    let mut frames: Vec<Frame> = Vec::new();
+pub(crate) fn joined(writes: impl Iterator<Item = RegisterWrite>) -> Vec<RegisterWrite> {
+    let mut frames: Vec<RegisterWrite> = Vec::new();
     for (address, bytes) in writes {
         match frames.last_mut() {
             Some((first, values)) if usize::from(*first) + values.len() == usize::from(address) => {

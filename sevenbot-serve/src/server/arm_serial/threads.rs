@@ -17,7 +17,7 @@ use tokio::sync::Notify;
 
 use crate::server::shared::lock;
 
-/// How long a read waits for its first byte, and so the longest delay of a write.
+/// How long a read waits for its first byte, and so the longest time by which it delays a write.
 const READ_TIMEOUT: Duration = Duration::from_millis(5);
 /// A port that takes no bytes for this long has failed.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(2);
@@ -92,7 +92,7 @@ impl ArmSerial {
         Ok(())
     }
 
-    /// Ends when the port takes bytes.
+    /// Ends when the bytes of an earlier [`Self::write`] were written, or the port has failed.
     pub(crate) async fn writable(&self) -> io::Result<()> {
         self.0.written.notified().await;
         Ok(())

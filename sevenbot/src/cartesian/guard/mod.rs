@@ -13,7 +13,7 @@ use std::fmt;
 use std::time::Duration;
 
 pub use kinematics::workspace::{BASE_MARGIN, KEEP_OUT_RADIUS, KEEP_OUT_TOP};
-use kinematics::{Clearance, Obstacle, Part, Workspace};
+use kinematics::{Clearance, FixedObstacle, Part, Workspace};
 
 use crate::fine_angle::FineAngle;
 use crate::recording::{Moment, Recording};
@@ -135,7 +135,7 @@ pub struct Breach {
     /// The part of the arm that is inside the obstacle.
     pub part: Part,
     /// The table, or the cylinder round the base.
-    pub obstacle: Obstacle,
+    pub obstacle: FixedObstacle,
     /// How deep the part is in the obstacle, in mm.
     pub depth_mm: f64,
     /// The height of the table, in mm.
@@ -159,8 +159,10 @@ impl fmt::Display for Breach {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (part, depth, table) = (self.part_name(), self.depth_mm, self.table_mm);
         match self.obstacle {
-            Obstacle::Table => write!(out, "{part} would be {depth:.1} mm below the table at z = {table} mm"),
-            Obstacle::Base => write!(
+            FixedObstacle::Table => {
+                write!(out, "{part} would be {depth:.1} mm below the table at z = {table} mm")
+            }
+            FixedObstacle::Base => write!(
                 out,
                 "{part} would be {depth:.1} mm inside the space of the base ({KEEP_OUT_RADIUS} mm round its axis, up to \
                  {KEEP_OUT_TOP} mm above the top plate)"
@@ -171,7 +173,7 @@ impl fmt::Display for Breach {
 
 impl std::error::Error for Breach {}
 
-/// The deepest place of a way inside an obstacle.
+/// The deepest place at which a way breaks the guard.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PathBreach {
     /// The part, the obstacle and the depth at this place.

@@ -52,7 +52,7 @@ impl StraightLineError {
         Self { at_mm: path.length * share, length_mm: path.length, tip: path.at(share).0, fault }
     }
 
-    /// The error for an end that is not a valid position.
+    /// The error for an end without a valid position or direction of the tool.
     pub(super) fn at_start(why: NoSolution, tip: Vector, tool: Vector) -> Self {
         let fault = StraightLineFault::Unreachable(Box::new(Unreachable::because(why, tip, tool, None)));
         Self { at_mm: 0.0, length_mm: 0.0, tip, fault }

@@ -13,7 +13,7 @@ use crate::playback::MAX_SEGMENT;
 use crate::units::Angle;
 
 /// Angles of joints 1 to 5, in degrees.
-pub(super) type Angles = [f64; 5];
+pub(super) type LineAngles = [f64; 5];
 
 /// The resolution of the targets, which also sets the time between them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,7 +51,7 @@ pub(super) struct PlannedPose {
 
 impl Rounding {
     /// The targets for exact angles at this fraction of the line.
-    pub(super) fn pose(&self, angles: Angles, path: &TipPath, share: f64) -> PlannedPose {
+    pub(super) fn pose(&self, angles: LineAngles, path: &TipPath, share: f64) -> PlannedPose {
         let targets = match self.resolution {
             TargetResolution::Degrees => self.nearest_degrees(angles, path, share),
             TargetResolution::Hundredths => self.nearest_hundredths(angles, path, share),
@@ -60,7 +60,7 @@ impl Rounding {
     }
 
     /// The targets at the end of the line. Whole degrees are those with the smallest miss: [`Self::best_degrees`].
-    pub(super) fn last_pose(&self, angles: Angles, path: &TipPath) -> PlannedPose {
+    pub(super) fn last_pose(&self, angles: LineAngles, path: &TipPath) -> PlannedPose {
         match self.resolution {
             TargetResolution::Degrees => PlannedPose::of(self.best_degrees(angles, path, 1.0), path, 1.0),
             TargetResolution::Hundredths => self.pose(angles, path, 1.0),
@@ -69,7 +69,7 @@ impl Rounding {
 
     /// The nearest whole degrees, if they are within the limits of the arm and the guard allows them; otherwise
     /// [`Self::best_degrees`].
-    fn nearest_degrees(&self, angles: Angles, path: &TipPath, share: f64) -> [FineAngle; 5] {
+    fn nearest_degrees(&self, angles: LineAngles, path: &TipPath, share: f64) -> [FineAngle; 5] {
         let whole = angles.map(f64::round);
         let [t1, t2, t3, t4, t5] = whole;
         let is_allowed = self.guard.is_none_or(|guard| guard.check_pose(whole).is_ok());
@@ -80,7 +80,7 @@ impl Rounding {
     }
 
     /// The nearest hundredths; [`Self::best_degrees`] if the hundredths would break a limit of the arm.
-    fn nearest_hundredths(&self, angles: Angles, path: &TipPath, share: f64) -> [FineAngle; 5] {
+    fn nearest_hundredths(&self, angles: LineAngles, path: &TipPath, share: f64) -> [FineAngle; 5] {
         let fine = angles.map(in_range);
         let [t1, t2, t3, t4, t5] = fine.map(FineAngle::degrees);
         let is_legal = check_arm([t1, t2, t3, t4, t5, 90.0]).is_ok();
@@ -89,7 +89,7 @@ impl Rounding {
 
     /// Of the whole degrees beside `angles` and within the limits, those nearest to the path. Prefers degrees that the guard
     /// allows.
-    fn best_degrees(&self, angles: Angles, path: &TipPath, share: f64) -> [FineAngle; 5] {
+    fn best_degrees(&self, angles: LineAngles, path: &TipPath, share: f64) -> [FineAngle; 5] {
         let (tip, tool) = path.at(share);
         let target = TipTarget::near(angles, tip, tool, self.guard.as_ref());
         target.degrees.map(|degrees| Angle::from_register(degrees).into())
@@ -104,7 +104,7 @@ impl PlannedPose {
         Self { angles, deviation_mm: path.distance(tip), tilt_degrees }
     }
 
-    pub(super) fn degrees(&self) -> Angles {
+    pub(super) fn degrees(&self) -> LineAngles {
         self.angles.map(FineAngle::degrees)
     }
 }

@@ -204,8 +204,8 @@ fn m04_m09_python_reads_reports() {
     });
 }
 
-/// A program of the other map has left its reports on. The first write of the next program ends them, so that the next
-/// program takes no report for an answer.
+/// A program of the other map has left its reports on. Each write of map 2.1 ends those of map 2.2, and a write of register 53
+/// ends those of map 2.1. After it the next program takes no report for an answer.
 #[test]
 fn m04_no_client_hears_the_other_maps_reports() {
     with_arm(TestSetup::any(), |arm| {

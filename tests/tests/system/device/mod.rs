@@ -1,4 +1,5 @@
-//! The device itself: frames, registers, motion, settings, servo faults, and the self-test image.
+//! The device itself: frames, registers, motion, settings, servo faults, the calls of the maker's programs, and the self-test
+//! image.
 
 mod maker_clients;
 mod motion;

@@ -1,5 +1,5 @@
-//! Attacks on `sevenbot serve`: floods, requests of web pages, late targets and wrong tokens. Each attack is bounded in count
-//! and time. Other tests here check that the tool finds the server, and that refused programs learn why.
+//! Attacks on `sevenbot serve`: floods, requests of web pages, late targets and wrong tokens. Most attacks are bounded in
+//! count or time. Other tests here check that the tool finds the server, and that refused programs learn why.
 
 use std::io::{Read, Write};
 use std::net::TcpStream;
@@ -21,7 +21,7 @@ use super::served::{
     LOCAL_PAGE, Served, WebClient, exchange, read_until, simulator, web_frame, web_handshake,
 };
 
-/// The registers of the server.
+/// Registers of the server.
 const DRIVEN_BY: u8 = 234;
 const STATE: u8 = 236;
 

@@ -210,7 +210,7 @@ fn a_stream_that_another_program_stops_says_so_and_leaves_no_period() {
     streams.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut stream = RunningProgram::spawn(&mut streams);
     let lines = "0,90,90,65,90,90,90,80\n20,150,90,65,90,90,90,80\n";
-    // The pipe stays open until the stream ends.
+    // The pipe stays open until the arm is stopped.
     stream.stdin.as_mut().expect("a pipe").write_all(lines.as_bytes()).expect("the tool reads");
     let mut arm = served.open("b");
     wait_until("joint 1 moves", || arm.register(PRESENT_POSITION) > 92);

@@ -1,5 +1,5 @@
-//! The shell blocks of docs/simulation.md: each command is run, and prints what the page shows, apart from numbers and
-//! paths.
+//! The shell blocks of docs/simulation.md: each command is run, and prints what the page shows, apart from numbers, paths and
+//! the width of spaces.
 
 use std::fs::{self, File};
 use std::io::{BufRead, BufReader, Write};

@@ -1,4 +1,5 @@
-//! `sevenbot record` and `play`, when a file cannot be written, the connection is lost or the arm restarts.
+//! `sevenbot record`, `play` and other commands with files, when a file cannot be written, the connection is lost or the arm
+//! restarts.
 
 use std::fs;
 use std::process::{Command, Stdio};

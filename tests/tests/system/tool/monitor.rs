@@ -29,7 +29,7 @@ fn row(screen: &str, joint: u8) -> Vec<&str> {
     rows.next().unwrap_or_default()
 }
 
-/// The screen without the parts that differ between runs: port, counts, times, and plots.
+/// The screen without the parts that differ between runs: port, supply, tip, plots, and the line of the link.
 fn masked(screen: &str, port: &Path) -> String {
     let port = port.to_str().expect("port names are UTF-8");
     let mask = |line: &str| {

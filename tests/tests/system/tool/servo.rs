@@ -12,7 +12,7 @@ use system_tests::{ArmClient, TestSetup, with_arm};
 
 /// Options of a scan: only the default baud rate of servos, and only the ids of an arm.
 const ARM_IDS: [&str; 4] = ["--rates", "1000000", "--ids", "0-6"];
-/// A long timeout of the tool for replies, in milliseconds. An id without a servo takes three timeouts.
+/// A long timeout of the tool for replies, in milliseconds. `info` of an id without a servo takes three timeouts.
 const LONG_TIMEOUT: &str = "2000";
 
 /// A simulated adapter with servos.

@@ -96,8 +96,8 @@ fn check(snapshot: &Snapshot) {
     check_names(snapshot);
 }
 
-/// Checks that every register of the snapshot has an entry of its own or an entry for its whole row, and that the library
-/// parses the name of each entry.
+/// Checks that every register of the snapshot has an entry of its own or an entry for a value of several registers. If the
+/// library parses the name of an entry, the name has to mean that entry.
 fn check_names(snapshot: &Snapshot) {
     let mut entries = register_text::entries(snapshot).into_iter().peekable();
     let mut row = None;

@@ -227,7 +227,7 @@ fn stored(map: Map, address: u8, value: u8) -> u8 {
     }
 }
 
-/// The address of the low byte of the two-byte register that holds `address`; `None` for a one-byte register.
+/// The address of the low byte of the writable two-byte register that holds `address`; `None` if there is none.
 fn word_at(address: u8) -> Option<u8> {
     matches!(address, 128..=141 | 184..=185).then_some(address & !1)
 }

@@ -4,7 +4,7 @@ use arm_sim::plant::Plant;
 use protocol_core::registers::map::PROTECTION;
 use protocol_core::time::{Duration, Instant};
 
-/// The time to wait after the start, and after a pose was written.
+/// The time to wait after the start, and after a pose was written or a payload was set.
 pub(super) const SETTLE_TIME: Duration = Duration::from_millis(3_000);
 /// The time between two points of a stream, in milliseconds.
 pub(super) const PERIOD_MS: u8 = 20;

@@ -1,8 +1,9 @@
 //! Checks the commands to the servos (D10, D12, D13, D25, D27 to D29).
 //!
 //! - No goal is out of reach at the allowed speed.
-//! - Goals are sent only in motor state servo, and torque switches follow the motor state.
-//! - Until the end of start-up, and to silent servos, only reads are sent.
+//! - Goals are sent only in motor state servo. Torque switches follow the motor state, apart from torque-off to a servo without
+//!   torque (D28).
+//! - Until the end of start-up only reads are sent. A silent servo gets neither goals nor torque.
 //! - Torque is switched on only at the position of a servo, and refreshed only after it was read as on. After an unanswered
 //!   read, the torque is read before the next goal (D28, D29).
 //! - A joint that lost its torque holds the position where it gets torque again, unless the host wrote a target meanwhile
@@ -58,7 +59,7 @@ pub(super) struct CommandChecker {
     /// The last goal of a joint whose servo was lost, and its tolerance in counts. A servo that answers again may continue from
     /// that goal (D12). The tolerance grows when offsets change.
     kept_goals: PerJoint<Option<(u16, u16)>>,
-    /// True until the joint has torque from this controller. Until then its goal may be the goal that its servo holds (D12).
+    /// True until the joint has torque from this controller or is released. Until then its goal may be that of its servo (D12).
     is_first: PerJoint<bool>,
     /// True if the joint is no longer driven, whatever its servo does. Its next torque needs a new goal.
     is_released: PerJoint<bool>,
@@ -67,7 +68,7 @@ pub(super) struct CommandChecker {
     replies: ServoReplies,
     wire_free_at: Instant,
     linkage: LinkageGoals,
-    /// When each joint was last given torque, when its servo was last lost, and when the host last wrote its target.
+    /// When each joint was last given torque, when its servo was last lost, and when the host last wrote its target or an offset.
     engaged_at: PerJoint<Option<Instant>>,
     servo_lost_at: PerJoint<Option<Instant>>,
     target_written_at: PerJoint<Option<Instant>>,

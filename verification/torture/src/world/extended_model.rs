@@ -82,7 +82,7 @@ pub(crate) fn fine_position(registers: &RegisterFile, joint: Joint) -> Option<u1
     Some(word_of(registers, FINE_POSITIONS + 2 * joint.index())).filter(|position| *position != UNKNOWN)
 }
 
-/// True if a frame to the host holds registers of the extended block. The arm computes them for such a frame only.
+/// True if a frame to the host holds registers of the extended block. The arm computes them for such a frame.
 pub(crate) fn shows_block(frame: &[u8]) -> bool {
     let [_, _, 3, first, count, ..] = frame else { return false };
     *count > 0 && *first < 192 && usize::from(*first) + usize::from(*count) > 128

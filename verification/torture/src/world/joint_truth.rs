@@ -114,7 +114,7 @@ impl JointTruth {
         self.lost_at
     }
 
-    /// True if the joint was let go less than [`ENGAGE_TIME`] ago, so that the controller need not have given torque again (D28).
+    /// True if the joint may have been let go less than [`ENGAGE_TIME`] ago: the controller need not have given torque again (D28).
     pub(super) fn may_wait_for_torque(&self, now: Instant) -> bool {
         self.lost_at.max(self.alarm_at).max(self.unpowered_at).is_some_and(|at| now - at < ENGAGE_TIME)
     }

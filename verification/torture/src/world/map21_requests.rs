@@ -3,8 +3,8 @@
 use super::host_request::HostRequest;
 use crate::seeded_rng::SeededRng;
 
-/// Converts a write of map 2.2 to a write of the same registers in map 2.1. About half of the writes of map 2.1 are made
-/// in this way, so that both maps change the same registers.
+/// Converts a write of map 2.2 to a write of the same registers in map 2.1. Apart from settings, about half of the writes of
+/// map 2.1 are made in this way, so that both maps change the same registers.
 pub(super) fn of_map22(request: (u8, Vec<u8>)) -> HostRequest {
     let (address, values) = request;
     HostRequest::WriteMap21 { address, values }

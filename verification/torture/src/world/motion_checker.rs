@@ -13,9 +13,9 @@
 //!
 //! A joint that carries a payload, or meets an obstacle or a hand, may be past its goals while its servo drives it back.
 //!
-//! A joint yields to its load: it droops, and when the controller alone restarts, the measured position is its new goal
-//! and it droops once more. With a payload it also runs past its goal. The tolerance follows from the load and the speed
-//! of each joint.
+//! A joint yields to its load: it droops, and when the controller alone restarts, the measured position may be its new
+//! goal, and then it droops once more. With a payload it also runs past its goal. The tolerance follows from the load and
+//! the speed of each joint.
 
 mod bounds;
 mod received_commands;

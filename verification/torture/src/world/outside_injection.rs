@@ -15,7 +15,7 @@ const LONGEST: Duration = Duration::from_millis(60_000);
 const SHORTEST: Duration = Duration::from_millis(50);
 /// The times of emergency stops, in milliseconds.
 const STOPS: [u64; 3] = [300, 3_000, 30_000];
-/// After an emergency stop, no other fault begins for this time.
+/// After an emergency stop, no other fault begins for this time, apart from repeated overloads.
 const AFTER_STOP: Duration = Duration::from_millis(3_000);
 /// The number of repeated overloads of a servo, and the time between two of them. A joint that fell comes to rest and
 /// engages within this time.

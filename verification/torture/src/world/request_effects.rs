@@ -28,7 +28,7 @@ impl PoweredArm {
 impl TortureWorld {
     /// Applies the next `count` requests to the model. `room` is the free space of the link, in bytes. `owed` then holds
     /// the effect of the last request; frames to the servos may come before its output. Compares the model with the arm's
-    /// registers: after requests all of them, otherwise only the targets.
+    /// registers: after requests all that the model knows, otherwise only the targets.
     pub(super) fn apply_requests(&mut self, arm: &mut PoweredArm, count: u16, room: usize) -> Check {
         self.record_missing(arm);
         self.record_lost_supply(arm)?;

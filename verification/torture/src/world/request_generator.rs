@@ -196,7 +196,7 @@ impl Transmission {
     }
 }
 
-/// Shortens a write that reaches these registers.
+/// Shortens a well-formed write that reaches these registers.
 fn leave_out((from, to): (usize, usize), address: u8, values: &mut Vec<u8>) {
     let (first, end) = (usize::from(address), usize::from(address) + values.len());
     if end <= 256 && first <= to && end > from {

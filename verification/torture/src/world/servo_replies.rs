@@ -9,9 +9,9 @@ use protocol_core::time::{Duration, Instant};
 use super::status_reply::{goal, measurements, torque_switch};
 use crate::per_joint::PerJoint;
 
-/// Start-up ends if each servo has sent this many replies.
+/// Start-up may end once each servo has sent this many replies.
 const START_UP_REPLIES: u8 = 2;
-/// Servos that were silent for a second count as restarted (D29). The margin of 100 ms is for the controller, whose second
+/// Servos that were silent for a second may have lost their supply (D29). The margin of 100 ms is for the controller, whose second
 /// starts when a read fails, not when it is sent.
 const LOST_AFTER: Duration = Duration::from_millis(900);
 /// The end of a silence may have effects for this long.
@@ -57,7 +57,7 @@ struct Known {
     held_goal: Option<u16>,
     /// The last measured position, in counts.
     position: Option<u16>,
-    /// The lowest and the highest position in counts: since the last goal, and between the two goals before.
+    /// The lowest and the highest position in counts: since the last goal, and in the last time between two goals with a reading.
     positions: [Option<(u16, u16)>; 2],
 }
 
@@ -69,7 +69,8 @@ pub(super) struct ServoReplies {
     /// The servo that was asked last, until it answers. The controller waits for no other.
     asked: Option<Joint>,
     servos: PerJoint<Known>,
-    /// All driven servos were silent at once for a second, and none was read with torque since then.
+    /// All driven servos were silent at once for a second. Since then none was read with torque, and the host has not written the
+    /// motor state.
     was_outage: bool,
 }
 
@@ -197,7 +198,8 @@ impl ServoReplies {
         end - start >= LOST_AFTER && now - end < NOTICE_TIME
     }
 
-    /// True if all driven servos were silent at once for a second, and none was read with torque since then.
+    /// True if all driven servos were silent at once for a second, and since then none was read with torque and the motor state
+    /// was not written.
     pub(super) const fn was_outage(&self) -> bool {
         self.was_outage
     }

@@ -34,9 +34,9 @@ pub(super) struct StatusChecker {
     pub(super) next_at: Instant,
     /// The last start of the arm or end of a stall of the shell.
     unsettled_at: Instant,
-    /// The last write that can move joints.
+    /// The last write that can move joints, or the last time that a servo was found.
     motion_at: Instant,
-    /// The last write of the motor state.
+    /// The last write of the motor state, or the last time that the arm entered state 0 by itself.
     state_at: Instant,
     /// The time by which each joint has to be at rest.
     settled_by: PerJoint<Instant>,

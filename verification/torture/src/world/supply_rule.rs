@@ -6,7 +6,7 @@ use protocol_core::time::{Duration, Instant};
 use super::protection_model::SUPPLY_LOST;
 use crate::violation::{Check, ensure};
 
-/// The arm has to enter state 0 after a stop of at least this time. It may enter state 0 after a stop of at least one second.
+/// The arm has to enter state 0 after a stop of at least this time. It may enter state 0 once the servos were silent for a second.
 const SURELY_LOST: Duration = Duration::from_millis(1_500);
 /// The servos start in 0.2 s. The arm notices that they restarted within this time, also on a bus with long timeouts.
 const NOTICE_TIME: Duration = Duration::from_millis(2_500);

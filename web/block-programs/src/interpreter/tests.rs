@@ -62,9 +62,9 @@ fn waits(blocks: &str) -> Result<Vec<f64>, ProgramError> {
     let mut waits = Vec::new();
     for _ in 0..100_000 {
         match run.advance()? {
-            Event::Begin(_) => {}
-            Event::Command(Command::Wait(time)) => waits.push(time.as_secs_f64()),
-            Event::Over => return Ok(waits),
+            ProgramEvent::Begin(_) => {}
+            ProgramEvent::Command(ProgramCommand::Wait(time)) => waits.push(time.as_secs_f64()),
+            ProgramEvent::Over => return Ok(waits),
             other => panic!("{other:?}"),
         }
     }
@@ -135,7 +135,7 @@ fn each_round_of_an_endless_loop_is_an_event() {
     );
     let mut run = Interpreter::new(&program(&start(&[endless])).expect("a program"));
     for _ in 0..1_000 {
-        assert_eq!(run.advance(), Ok(Event::Begin("controls_whileUntil".into())));
+        assert_eq!(run.advance(), Ok(ProgramEvent::Begin("controls_whileUntil".into())));
     }
 }
 

@@ -76,7 +76,7 @@ fn a_stop_for_all_ends_the_programs_of_the_pupils_and_says_who_stopped() {
     }
     wait_for_tile(&mut teacher, "Mia", ".doing", "a program runs");
     wait_for_tile(&mut teacher, "Mia 2", ".doing", "a program runs");
-    // The space bar stops all arms, whatever has the focus.
+    // The space bar stops all arms, also with the focus on a button.
     teacher.focus("[data-action=language]");
     teacher.key(" ");
     teacher.wait_for_text("#state", "Last stop: confirmed by all arms (2)");

@@ -1,4 +1,4 @@
-//! The programs and the wheel for aarch64, in qemu with the libraries of Debian for that processor.
+//! `sevenbot` and the wheel for aarch64, in qemu with the libraries of Debian for that processor.
 
 use std::path::Path;
 use std::process::Command;
@@ -16,7 +16,7 @@ use crate::run::{TaskResult, run_command, target_directory};
 /// Emulates a program for aarch64 on the kernel of this computer.
 const QEMU: &str = "qemu-aarch64-static";
 
-/// Tries the programs and the wheel.
+/// Tries `sevenbot` and the wheel.
 pub(super) fn aarch64(release: &Release) -> TaskResult {
     let packed = target_directory().join("dist-roots/debian-arm64.tar");
     let packed =

@@ -1,4 +1,4 @@
-//! Installs the parts of a release as its users do, and uses them.
+//! Installs parts of a release as its users do, and uses them.
 //!
 //! ```text
 //!   archive, .deb, wheel ──▶ a bare Debian: no compiler, no Rust
@@ -29,14 +29,14 @@ pub(crate) fn native() -> TaskResult {
     installed::programs(&noted(&folder)?)
 }
 
-/// Makes a whole release, and tries each part.
+/// Makes a whole release, and tries it.
 pub(crate) fn whole() -> TaskResult {
     let folder = target_directory().join("dist-whole");
     make(folder.clone())?;
     parts(&folder)
 }
 
-/// Tries each part of a finished release.
+/// Tries a finished release: the programs, the packages, the module's wheels, the page and the `.dfu` file.
 pub(super) fn parts(folder: &Path) -> TaskResult {
     install::for_release()?;
     check::check(folder, true)?;

@@ -1,6 +1,6 @@
 //! `sevenbot.exe` in Wine: with the arm inside the program, and with the simulator's port as COM7.
 //!
-//! Wine 8 has no `bcryptprimitives.dll`, from which each Rust program takes random numbers. The test builds a substitute.
+//! Wine 8 has no `bcryptprimitives.dll`, from which Rust's standard library takes random numbers. The test builds a substitute.
 
 use std::fs;
 use std::os::unix::fs::symlink;

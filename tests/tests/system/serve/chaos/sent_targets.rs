@@ -27,8 +27,8 @@ pub(crate) struct SentTargets {
     /// For each write, the microseconds from `start` to the end of its sending. 0: it is being sent.
     times: Vec<AtomicU64>,
     arrived: Mutex<Vec<Duration>>,
-    /// The last positions that the arm sent. A `stop` through the maker's WebSocket writes one of these as targets. Such a
-    /// write is ignored, because it may look like targets that were sent long ago.
+    /// The last positions that the arm sent. A hold in whole degrees writes one of these as targets. Such a write is ignored,
+    /// because it may look like targets that were sent long ago.
     positions: Mutex<VecDeque<[u8; JOINTS]>>,
 }
 

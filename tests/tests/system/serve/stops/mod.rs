@@ -177,8 +177,8 @@ fn check_is_at_rest(program: &mut Program, held: &[u8], context: &str) {
     assert!(moved <= STILL, "{context}: moved by {moved} hundredths");
 }
 
-/// Stops the arm as `sevenbot stop` does: reads the positions, writes them as targets, and reads the targets back. Repeats this
-/// until the targets equal the positions. Returns the times, and these targets.
+/// Stops the arm: reads the positions, writes them as targets, and reads the targets back. Repeats this until the targets equal
+/// the positions. Returns the times, and these targets.
 fn stop(stopper: &mut Program, line: &Line) -> (StopTimes, Vec<u8>) {
     let start = Instant::now();
     for _ in 0..100 {
@@ -203,7 +203,7 @@ fn stop(stopper: &mut Program, line: &Line) -> (StopTimes, Vec<u8>) {
 }
 
 /// Checks that since the stop no frame reached the arm that begins with a coarse target. This covers the targets of all other
-/// programs, except those of [`Attack::LongWrites`], whose frames begin at register 0.
+/// programs, except those of [`Attack::LongWrites`], whose frames begin before the targets.
 #[track_caller]
 fn check_rests(line: &Line, stop: &[u8], context: &str) {
     let line = line.lock().expect("no panic");

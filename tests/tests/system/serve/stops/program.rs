@@ -15,7 +15,7 @@ use system_tests::{read_request, write_request};
 use super::gate::Gate;
 use crate::serve::served::Served;
 
-/// The token for connections over TCP.
+/// The token for connections over TCP and to the WebSocket.
 pub(crate) const TOKEN: &str = "correct-horse";
 /// A program that writes 2 to this register may drive again after a stop.
 const COMMAND: u8 = 239;

@@ -11,7 +11,7 @@ const MAX_HUNDREDTHS: u16 = 18_000;
 const UNKNOWN: u16 = 65_535;
 
 /// Checks the registers after a reply with `count` registers from `address` on. Skips a reply without the extended block,
-/// because the arm computes the block only for a reply that shows it.
+/// because the arm need not compute the block for it.
 pub fn check_reply(address: u8, count: u8, registers: &RegisterFile) {
     let end = u16::from(address) + u16::from(count);
     if address > MEASURED_JOINTS.address || end <= FINE_TARGET.address.into() {

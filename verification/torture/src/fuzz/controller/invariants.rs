@@ -73,6 +73,7 @@ impl InvariantChecker {
     }
 
     /// Checks that a frame to the host is complete, that its values match the registers, and that the settings were saved before.
+    /// Checks of an alarm only that alarms are on.
     pub fn frame_to_host(&self, bytes: &[u8], registers: &RegisterFile) {
         let ParseOutcome::Complete(reply, length) = parse::<ToHost>(bytes) else {
             panic!("{bytes:?} is not a frame")

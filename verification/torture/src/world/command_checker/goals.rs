@@ -110,8 +110,8 @@ impl CommandChecker {
     }
 }
 
-/// Checks that the goal of a joint that has arrived is its target. A target that the host did not write is the measured
-/// position, rounded to degrees and limited to 0..=180.
+/// Checks that the goal of a joint that has arrived is its target. A target that the arm set itself is rounded to degrees
+/// and limited to 0..=180.
 fn check_arrival(joint: Joint, goal: u16, context: &CommandContext<'_>) -> Check {
     if context.registers.get(MOVING_JOINTS.address) & joint.bit() != 0 {
         return Ok(());

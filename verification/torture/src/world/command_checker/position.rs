@@ -1,4 +1,4 @@
-//! Checks that a joint gets a goal or torque only at its position, and only if its servo answers (D12).
+//! Checks that a joint gets its first goal, and torque, only at its position, and only if its servo answers (D12).
 
 use protocol_core::registers::Joint;
 use protocol_core::registers::map::MISSING_SERVOS;
@@ -16,7 +16,7 @@ const FRESH_FOR: Duration = Duration::from_millis(20);
 const MAX_FALL: u16 = 12;
 
 impl CommandChecker {
-    /// Checks that a silent servo receives only reads (D12).
+    /// Checks that a silent servo gets neither a goal nor torque (D12).
     pub(super) fn check_responding(&self, joint: Joint, what: &str, context: &CommandContext<'_>) -> Check {
         let is_flagged = context.registers.get(MISSING_SERVOS.address) & joint.bit() != 0;
         // On a disturbed bus the controller may decode a reply that this decoder misses.

@@ -1,5 +1,5 @@
-//! Checks that torque is switched on only at the position of a joint, with the goal that its servo holds, and off only if
-//! the servo has no torque (D12, D13, D28).
+//! Checks that torque is switched on only at the position of a joint, with the goal that its servo holds, and in state servo off
+//! only if the servo has no torque (D12, D13, D28).
 
 use motion_core::servo_bus::Torque;
 use protocol_core::registers::Joint;
@@ -14,7 +14,7 @@ use crate::violation::{Check, Violation, ensure};
 const HELD_FOR: Duration = Duration::from_millis(1_000);
 
 impl CommandChecker {
-    /// Checks that torque switches are set to the motor state in register 29 (D13).
+    /// Checks that torque switches are set to the motor state in register 29 (D13), or off for a servo without torque (D28).
     pub(super) fn check_torque_switches(&mut self, items: &[u8], context: &CommandContext<'_>) -> Check {
         let state = context.registers.get(MOTOR_STATE.address);
         let torque = match state {

@@ -7,7 +7,7 @@ use crate::per_joint::PerJoint;
 
 /// The controller may accept a false reading if two undetected errors come within this time.
 const MISREAD_TIME: Duration = Duration::from_millis(1_000);
-/// The largest error of a single false reading that the controller accepts, in counts: 8 for a joint at rest. A joint that sinks
+/// The largest error of a single false reading at which a joint engages, in counts: 8 for a joint at rest. A joint that sinks
 /// slowly and is read four times a second has 15 more.
 const TOLERANCE: u64 = 8 + 15;
 

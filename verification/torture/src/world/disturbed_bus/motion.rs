@@ -19,8 +19,9 @@ impl DisturbedBus {
         self.motion_checker.exempt_all(now, Exemption::MotorState);
     }
 
-    /// Checks that no joint has moved by itself or pushes too hard, and records the true state of each joint. `is_guarded` tells
-    /// that the controller runs and protects the servos. `limits` are the push limits in 0.1 %; `None` without protection.
+    /// Checks that no joint has moved by itself or pushes too hard. In state servo, records the true state of each joint.
+    /// `is_guarded` tells that the controller runs and protects the servos. `limits` are the push limits in 0.1 %; `None` without
+    /// protection.
     pub(crate) fn check_motion(
         &mut self,
         now: Instant,

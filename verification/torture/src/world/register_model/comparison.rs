@@ -32,7 +32,7 @@ impl RegisterModel {
     }
 
     /// Compares the model with the registers of the arm. Also checks that registers 83 to 89 repeat 54 to 60, and that the loads
-    /// in 91 to 97 are in range (M3).
+    /// in 91 to 97 are in range (M9).
     pub(crate) fn compare(&self, registers: &RegisterFile) -> Check {
         for (first, last) in MODELLED {
             let ours = self.shown(*first, *last);

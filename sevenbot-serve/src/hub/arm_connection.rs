@@ -14,7 +14,7 @@ use protocol_core::time::{Duration, Instant};
 use super::known_registers::KnownRegisters;
 use super::line::Owner;
 use super::presence::Presence;
-use super::{ArmState, Hub};
+use super::{ArmConnection, Hub};
 
 /// Time between two questions to a port behind which no arm answers.
 const IDENTIFY_PERIOD: Duration = Duration::from_millis(250);
@@ -28,13 +28,13 @@ impl Hub {
     /// Has the arm stopped answering although its port is open? It may still receive what is sent to it.
     #[must_use]
     pub const fn is_silent(&self) -> bool {
-        matches!(self.arm, ArmState::Silent(_))
+        matches!(self.arm, ArmConnection::Silent(_))
     }
 
     /// Does a 7Bot V2 answer?
     #[must_use]
     pub fn has_arm(&self) -> bool {
-        self.arm == ArmState::Present
+        self.arm == ArmConnection::Present
     }
 
     /// From now on only the present arm is accepted, by its chip id.
@@ -45,7 +45,7 @@ impl Hub {
     /// The arm no longer answers. Drops the requests that wait for it, and ends the reads on their way. A hold in progress goes
     /// on.
     pub(super) fn lose_arm(&mut self, now: Instant) {
-        self.arm = ArmState::Silent(now);
+        self.arm = ArmConnection::Silent(now);
         self.line.end_reads();
         self.drop_requests();
     }
@@ -57,22 +57,22 @@ impl Hub {
             return;
         }
         let (owner, (address, count)) = match self.arm {
-            ArmState::Present => (Owner::Presence, Presence::QUESTION),
+            ArmConnection::Present => (Owner::Presence, Presence::QUESTION),
             _ => (Owner::Identity, KnownRegisters::IDENTITY),
         };
         self.line.send_read(now, owner, address, count);
         match &mut self.arm {
-            ArmState::Identifying(due) | ArmState::Silent(due) => *due = now + IDENTIFY_PERIOD,
-            ArmState::Absent | ArmState::Present => self.presence.ask(now),
+            ArmConnection::Identifying(due) | ArmConnection::Silent(due) => *due = now + IDENTIFY_PERIOD,
+            ArmConnection::Absent | ArmConnection::Present => self.presence.ask(now),
         }
     }
 
     /// When the next question to the arm is due.
     pub(super) fn question_due(&self) -> Instant {
         match self.arm {
-            ArmState::Absent => Instant::FAR_FUTURE,
-            ArmState::Identifying(due) | ArmState::Silent(due) => due,
-            ArmState::Present => self.presence.due(self.line.is_waiting()),
+            ArmConnection::Absent => Instant::FAR_FUTURE,
+            ArmConnection::Identifying(due) | ArmConnection::Silent(due) => due,
+            ArmConnection::Present => self.presence.due(self.line.is_waiting()),
         }
     }
 
@@ -81,8 +81,8 @@ impl Hub {
     pub(super) fn identify(&mut self, now: Instant, values: &[u8]) {
         let Some(known) = KnownRegisters::of_arm(values) else { return };
         let is_wanted = self.chip_id.as_deref().is_none_or(|id| known.chip_id() == id);
-        if is_wanted && self.arm != ArmState::Present {
-            self.arm = ArmState::Present;
+        if is_wanted && self.arm != ArmConnection::Present {
+            self.arm = ArmConnection::Present;
             let before = std::mem::replace(&mut self.known, known);
             self.find_again(&before);
             self.watchdog.forget();
