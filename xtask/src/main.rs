@@ -29,7 +29,6 @@ mod ros;
 mod ros_model;
 mod run;
 mod size;
-mod start_up;
 mod steps;
 mod system_tests;
 mod test;
@@ -156,7 +155,7 @@ fn run_task(task: &Task) -> TaskResult {
         Task::NoPanic => no_panic::check(),
         Task::Size { by_file: true, .. } => size::print(),
         Task::Size { accept, .. } => footprint::check(accept.accept),
-        Task::StartUp => start_up::check(),
+        Task::StartUp => run::start_up(),
         Task::Count(Accept { accept }) => count::check(*accept),
         Task::Coverage => coverage::check(),
         Task::Emulate(options) => emulate(options),

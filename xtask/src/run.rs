@@ -82,6 +82,12 @@ pub(crate) fn experiment(name: &str) -> TaskResult {
     cargo(&format!("run --quiet -p emulator --example {name}"))
 }
 
+/// Builds the image, and tests its start in the emulator.
+pub(crate) fn start_up() -> TaskResult {
+    emulator::need_qemu().and_then(|()| build_image())?;
+    cargo(&format!("test {TESTED} --test start_up -- --include-ignored"))
+}
+
 /// Builds the simulator through one of its tests, so that cargo selects the same features as for all tests.
 pub(crate) fn build_host_sim() -> TaskResult {
     cargo(&format!("test --quiet {TESTED} --test simulator --no-run"))

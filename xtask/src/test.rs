@@ -5,11 +5,11 @@
 
 use clap::Args;
 
-use crate::run::{CHECKED, CHIP, TESTED, TaskResult, build_for_browser, cargo, run};
+use crate::run::{self, CHECKED, CHIP, TESTED, TaskResult, build_for_browser, cargo, run};
 use crate::steps::{self, Stage, TestScope, long, quick, whole};
 use crate::{
     count, deny, dist, docs, footprint, fuzz, install, lerobot, modules, mujoco, no_panic, python, replays,
-    ros, start_up, system_tests, torture, trials, web,
+    ros, system_tests, torture, trials, web,
 };
 
 /// The scope of the run.
@@ -74,7 +74,7 @@ const STAGES: &[Stage] = &[
     &[
         // These steps compute. The counts come after the first tests on an emulated chip.
         &[
-            whole("start-up of the image", start_up::check),
+            whole("start-up of the image", run::start_up),
             whole("recorded sessions, natively and in a WebAssembly module", replays::short),
             whole("instructions are within their budgets", || count::check(false)),
             whole("worlds with injected faults", torture::short),
