@@ -156,7 +156,12 @@ fn bad_messages_and_names_end_the_connection() {
             assert_eq!(lesson.hear_all(id), [ToPupil::Refused(Refusal::BadMessage)], "{text}");
             assert!(lesson.class.is_over(id));
         }
-        assert_eq!(lesson.tile("Mia").presence, Presence::Lost);
+        assert_eq!(lesson.tile("Mia").presence, TabPresence::Lost);
+        if text != r#""stop_all""# {
+            lesson.class.receive(lesson.now, lesson.teacher, text);
+            assert_eq!(lesson.class.next_message(lesson.now, lesson.teacher), None, "{text}");
+            assert!(lesson.class.is_over(lesson.teacher), "{text}");
+        }
     }
     let mut lesson = Lesson::new(false);
     let nameless = lesson.join_with(" \u{200b}-", None);

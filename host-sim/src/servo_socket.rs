@@ -60,9 +60,15 @@ impl ServoSocket {
                 controller = self.socket.accept()?;
                 controller.iter().for_each(|_| info!("controller connected"));
             }
-            if let Some(stream) = &mut controller
-                && let Err(end) = exchange(stream, &mut plant, now)
-            {
+            let ended = match &mut controller {
+                Some(stream) => exchange(stream, &mut plant, now).err(),
+                None => {
+                    // Without a controller the servos move on, and nobody hears their answers.
+                    plant.poll(now);
+                    None
+                }
+            };
+            if let Some(end) = ended {
                 info!("controller gone ({end})");
                 controller = None;
                 continue;

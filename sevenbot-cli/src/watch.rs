@@ -57,7 +57,20 @@ pub(crate) fn note_other_pace(arm: &mut Arm, targets: &FineTargets) -> Result<()
     if arm.identity().firmware() != Firmware::Ours {
         return Ok(());
     }
-    let others = PaceBefore::read(arm, targets)?.other_than_default();
+    note_paces(PaceBefore::read(arm, targets)?.other_than_default());
+    Ok(())
+}
+
+/// Tells the user which joints are slower than the default: no joint follows a stream faster than its speed.
+pub(crate) fn note_slow_joints(arm: &mut Arm) -> Result<(), CommandError> {
+    let all = arm.fine_targets()?.map(Some);
+    let mut slow = PaceBefore::read(arm, &all)?.other_than_default();
+    slow.retain(|(_, speed, _)| speed.degrees_per_second() < Speed::DEFAULT.degrees_per_second());
+    note_paces(slow);
+    Ok(())
+}
+
+fn note_paces(others: Vec<(u8, Speed, MoveTime)>) {
     let paces = others.into_iter().map(|(bits, speed, time)| match time {
         MoveTime::NONE => format!("{}: {:.1} degrees/s", joints(bits), speed.degrees_per_second()),
         time => format!("{}: {:.1} s for each move", joints(bits), time.duration().as_secs_f64()),

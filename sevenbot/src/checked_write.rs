@@ -89,7 +89,11 @@ impl Arm {
         work: impl FnOnce(&mut Self) -> Result<T, WriteError>,
     ) -> Result<T, WriteError> {
         let before = self.status()?;
-        self.write_checked(EEPROM_LOCK.address, &[0])?;
+        if let Err(why) = self.write_checked(EEPROM_LOCK.address, &[0]) {
+            // The lock may be open: only the reply may be lost.
+            let _ = self.write(EEPROM_LOCK.address, &[1]);
+            return Err(why);
+        }
         let done = self.told_of_restart(before, work);
         let closed = self.write_checked(EEPROM_LOCK.address, &[1]);
         let done = done?;

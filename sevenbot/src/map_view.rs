@@ -125,7 +125,11 @@ impl MapView {
     /// is map 2.1, so that one frame holds all.
     fn default_map(self, address: u8, count: usize) -> Map {
         let has = |test: &dyn Fn(u8) -> bool| (address..=u8::MAX).take(count).any(test);
-        let is_only_map22 = |address| FEEDBACK_FREQUENCY.holds(address) || PRESENT_POSITION.holds(address);
+        let is_only_map22 = |address| {
+            FEEDBACK_FREQUENCY.holds(address)
+                || PRESENT_POSITION.holds(address)
+                || OUR_BLOCKS.contains(&address)
+        };
         match self.map {
             Map::V22 if has(&|address| self.writes_by_map21(address)) && !has(&is_only_map22) => Map::V21,
             map => map,
@@ -290,6 +294,8 @@ mod tests {
         assert_eq!(BOTH.writes(11, &settings[..9]), [frame(Map::V22, 11, settings[..9].to_vec())]);
         let mixed = BOTH.writes(52, &(52..=66).collect::<Vec<u8>>());
         assert_eq!(mixed, [frame(Map::V22, 52, 52..=60), frame(Map::V21, 61, 61..=66)]);
+        let frames = BOTH.writes(97, &(97..=130).collect::<Vec<u8>>());
+        assert_eq!(frames, [frame(Map::V21, 97, 97..=97), frame(Map::V22, 98, 98..=130)]);
     }
 
     #[test]

@@ -235,6 +235,9 @@ impl World {
     /// Finds the object between the claws, and moves it to their middle as they close. Returns the angle of joint 7 at which they
     /// touch it.
     fn claw_stop(&mut self, hand: &Hand) -> Option<f64> {
+        if self.scene.tool == Tool::Cup {
+            return None;
+        }
         let grip = hand.grip();
         self.between = match self.carried {
             Some((index, _)) => Some(index),
@@ -252,9 +255,6 @@ impl World {
     }
 
     fn find_between(&self, grip: &Grip) -> Option<usize> {
-        if self.scene.tool == Tool::Cup {
-            return None;
-        }
         self.objects.iter().position(|object| {
             let Vector { x, y, z } = grip.frame.local(object.frame.origin);
             let reach = |axis| object.solid.reach(&object.frame, axis);

@@ -175,6 +175,10 @@ fn the_cup_carries_while_the_pump_sucks() {
     room.write(31, &[1]);
     room.tip_to(0.0, 220.0, 80.0);
     room.assert_at("can", [0.0, 220.0, 24.5], 6.0);
+    for claw in [10, 80] {
+        room.claws_to(claw);
+        assert_eq!(room.blocked(), 0, "what hangs on the cup is not between the claws");
+    }
     assert_eq!(room.0.plant().load_grams(), 100);
     room.write(31, &[0]);
     room.assert_at("can", [0.0, 220.0, -30.0], 6.0);

@@ -53,9 +53,9 @@ enum TabConnection {
     },
     Pupil(u32),
     Teacher(Desk),
-    /// The reason for the refusal; `None` once it was sent. Then [`Classroom::is_over`] tells the caller to close the
-    /// connection.
-    Refused(Option<Refused>),
+    /// The reason for the refusal; `None` once it was sent, or if none is to be sent. Then [`Classroom::is_over`] tells the
+    /// caller to close the connection.
+    Refused(Option<RefusedTab>),
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -161,8 +161,10 @@ impl Classroom {
 
     /// Ends a connection. A pupil is told the reason.
     fn refuse(&mut self, now: Instant, id: ConnectionId, why: Refusal) {
+        let is_teacher = matches!(self.connections.get(&id), Some(TabConnection::Teacher(_)));
         self.close(now, id);
-        self.connections.insert(id, Connection::Refused(Some(Refused::Pupil(why))));
+        let why = (!is_teacher).then_some(RefusedTab::Pupil(why));
+        self.connections.insert(id, TabConnection::Refused(why));
     }
 
     fn join(&mut self, now: Instant, id: ConnectionId, wanted: &str, key: String, known: Option<&str>) {

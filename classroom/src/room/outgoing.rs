@@ -40,7 +40,7 @@ impl Classroom {
         message
     }
 
-    /// True if the connection has got its last message, and has to be closed. Also for an unknown connection.
+    /// True if no more message is due for the connection, and it has to be closed. Also for an unknown connection.
     #[must_use]
     pub fn is_over(&self, id: ConnectionId) -> bool {
         matches!(self.connections.get(&id), None | Some(TabConnection::Refused(None)))

@@ -1,10 +1,12 @@
-//! The built simulator as a servo bus behind a USB adapter: raw bytes on a port.
+//! The built simulator as a servo bus: raw bytes on the port of a USB adapter, or on a socket.
 
 use crate::sim;
 
 use std::fs;
+use std::io::{Read, Write};
+use std::os::unix::net::UnixStream;
 use std::path::Path;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use crate::sim::{Bus, Sim};
 use rustix::process::Signal;
@@ -85,4 +87,34 @@ fn the_servos_keep_their_state_while_the_adapter_is_unplugged() {
     let mut bus = Bus::open(&link, 1_000_000);
     let torque_switch = [0xFF, 0xFF, 0, 4, 2, 40, 1, !47];
     assert_eq!(bus.ask(&torque_switch, 7), [0xFF, 0xFF, 0, 3, 0, 2, !5]);
+}
+
+#[test]
+fn the_servos_behind_a_socket_move_on_without_a_controller() {
+    let folder = tempfile::tempdir().unwrap();
+    let (socket, angles) = (folder.path().join("servos"), folder.path().join("angles"));
+    let _sim =
+        Sim::start(&["--servo-socket", socket.to_str().unwrap(), "--angles", angles.to_str().unwrap()]);
+    let mut controller = UnixStream::connect(&socket).unwrap();
+    controller.set_read_timeout(Some(Duration::from_millis(300))).unwrap();
+    // Torque, and a goal 189 counts away at 100 counts a second, until the servo has started and acknowledges both.
+    let torque = [0xFF, 0xFF, 0, 4, 3, 40, 1, !48];
+    let goal = [0xFF, 0xFF, 0, 9, 3, 42, 2, 188, 0, 0, 0, 100, !88];
+    let end = Instant::now() + Duration::from_secs(60);
+    loop {
+        controller.write_all(&[torque.as_slice(), &goal].concat()).unwrap();
+        match controller.read_exact(&mut [0; 12]) {
+            Ok(()) => break,
+            Err(error) => assert!(Instant::now() < end, "{error}"),
+        }
+    }
+    drop(controller);
+    let turned = || {
+        let lines = fs::read_to_string(&angles).unwrap();
+        let joint_1 = lines.lines().last()?.split(',').nth(1)?.parse::<f64>().ok()?;
+        Some((joint_1 - 90.0).abs())
+    };
+    while turned().is_none_or(|degrees| degrees < 30.0) {
+        assert!(Instant::now() < end, "{:?} degrees", turned());
+    }
 }

@@ -35,7 +35,7 @@ pub enum ProblemKind {
     HostSilent,
     /// Settings cannot be stored, or could not be read ([D19](protocol_core::decisions#d19)).
     SettingsStorage,
-    /// The controller hung and restarted.
+    /// The controller hung or crashed, and restarted.
     WatchdogRestart,
     /// The controller restarted after a drop of its supply.
     BrownOutRestart,
@@ -140,7 +140,7 @@ const TABLE: [ProblemTexts; 16] = [
     ProblemTexts::of(
         ProblemKind::WatchdogRestart,
         "restarted by the watchdog",
-        "the controller hung and restarted",
+        "the controller hung or crashed, and restarted",
         "switch the controller off and on to clear this; please report it with what the arm was doing",
     ),
     ProblemTexts::of(

@@ -112,6 +112,8 @@ impl LatestPoints {
         let (is_silent, watchdog) = (self.is_silent(now), self.options.watchdog_time());
         let leading = self.leading.as_mut()?;
         if is_silent && !leading.is_new {
+            // No point is sent until the next action, so none stays due.
+            leading.pace.restart(now);
             let is_due = now >= leading.asks_at(watchdog) && !leading.was_asked;
             leading.was_asked |= is_due;
             return is_due.then_some(LatestStep::AskWatchdog);
@@ -264,6 +266,16 @@ mod tests {
         assert_eq!(points.next(after(10_005)), Some(LatestStep::Send(action(91))), "on a grid of its own");
         assert_eq!(points.counts().missed, 0);
         assert_eq!(points.wake_at(), Some(after(10_025)));
+    }
+
+    #[test]
+    fn a_sender_that_misses_the_last_point_before_a_silence_waits() {
+        let mut points = points();
+        points.offer(START, &action(90));
+        assert!(points.next(START).is_some());
+        assert_eq!((points.next(after(310)), points.wake_at()), (None, Some(after(650))));
+        assert_eq!(points.next(after(650)), Some(LatestStep::AskWatchdog));
+        assert_eq!(points.wake_at(), None);
     }
 
     #[test]

@@ -3,10 +3,13 @@
 #![cfg(unix)]
 
 use std::io::{Read, Write};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-use crate::fake::{IDENTITY, answering_arm, reply};
+use crate::fake::{IDENTITY, answering_arm, execute, moving_registers, reply, scripted_arm};
+use protocol_core::request::Request;
 use serialport::{SerialPort, TTYPort};
 use sevenbot::{Arm, ArmOptions, Error, OpenError, ReceiveCounts};
 
@@ -21,6 +24,27 @@ fn a_lost_read_is_repeated() {
     let arm = Arm::open_with(&name, options()).expect("the third try is answered");
     assert_eq!(arm.identity().version(), "3.0");
     assert_eq!(arm.identity().chip_id(), [1, 2, 3, 4, 5, 6]);
+}
+
+#[test]
+fn a_lock_is_closed_again_if_its_opening_is_not_confirmed() {
+    let registers = moving_registers();
+    let shown = Arc::clone(&registers);
+    let (mut is_silent, opened) = (false, Arc::<AtomicBool>::default());
+    let was_opened = Arc::clone(&opened);
+    let (name, _port) = scripted_arm(move |_, request| {
+        is_silent |= matches!(request, Request::Write { address: 28, .. });
+        opened.fetch_or(matches!(request, Request::Write { address: 28, values: [0] }), Ordering::Relaxed);
+        let answer = execute(&mut registers.lock().unwrap(), request);
+        if is_silent { Vec::new() } else { answer }
+    });
+    let mut arm = Arm::open_with(&name, options()).unwrap();
+    assert!(arm.with_open_lock(|_| Ok(())).is_err());
+    let end = Instant::now() + Duration::from_secs(10);
+    while !was_opened.load(Ordering::Relaxed) || shown.lock().unwrap()[28] != 1 {
+        assert!(Instant::now() < end, "the lock stays open");
+        thread::yield_now();
+    }
 }
 
 #[test]

@@ -16,6 +16,8 @@ use crate::shared::free_moves::{FreeMoves, Step};
 
 /// The time from power-up to the first write.
 const START: Duration = Duration::from_millis(1_000);
+/// The time for a short read and its reply at 115,200 baud, in milliseconds.
+const READ_MS: u64 = 3;
 
 /// What some motions showed. Each is carried out with and without protection.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -107,13 +109,22 @@ impl MovedArm {
     }
 
     fn carry_out(&mut self, step: &Step) {
-        let mut frame = FrameBuffer::new();
-        Request::Write { address: step.address, values: &step.values }.encode(&mut frame);
-        self.arm.host_send(self.now, &frame);
-        // Wait at least 2 ms, so that the frame has left the line before the next one is sent.
-        self.pass(Duration::from_millis(step.wait_ms.max(2)));
+        // Wait so long that both frames have left the line before the next one is sent.
+        let wait_ms = step.wait_ms.max(5) - READ_MS;
+        self.send(&Request::Write { address: step.address, values: &step.values }, wait_ms);
+        // The arm updates these registers when a host reads them.
+        let count = LET_GO_JOINTS.address - BLOCKED_JOINTS.address + 1;
+        self.send(&Request::Read { address: BLOCKED_JOINTS.address, count }, READ_MS);
+        self.arm.host_take(self.arm.host_received().len());
         let registers = self.arm.registers();
         self.was_blocked |= [BLOCKED_JOINTS, LET_GO_JOINTS].iter().any(|row| registers.get(row.address) != 0);
+    }
+
+    fn send(&mut self, request: &Request<'_>, wait_ms: u64) {
+        let mut frame = FrameBuffer::new();
+        request.encode(&mut frame);
+        self.arm.host_send(self.now, &frame);
+        self.pass(Duration::from_millis(wait_ms));
     }
 
     fn pass(&mut self, time: Duration) {

@@ -94,6 +94,7 @@ impl Page {
     pub fn reload(&mut self) {
         self.evaluate("delete window.sevenbot");
         self.call("Page.reload", json!({}));
+        self.heard = 0;
         self.wait_until_it_draws();
     }
 

@@ -5,6 +5,7 @@ use sevenbot::Joint;
 use sevenbot::cartesian::JogAxes;
 use sevenbot::map::motor_state;
 
+use super::plot_kind::PlotKind;
 use super::view::{Dialog, MonitorView, SpeedChange, UiCommand};
 
 /// Degrees of a nudge, without and with Shift.
@@ -113,6 +114,7 @@ fn select(view: &mut MonitorView, number: i16) {
 /// Shows the next quantity in the plot, unless the arm is known to measure positions only.
 fn change_plot(view: &mut MonitorView) {
     if view.sample.as_ref().is_some_and(|sample| sample.fine.is_none()) {
+        view.plot = PlotKind::Position;
         view.show_note("this arm's firmware measures no velocities and loads");
     } else {
         view.plot = view.plot.next();
@@ -146,7 +148,7 @@ fn nudge(view: &mut MonitorView, degrees: i16) -> KeyAction {
 
 /// Sends a command that moves the arm, if the motors drive it.
 fn drive(view: &mut MonitorView, command: UiCommand) -> KeyAction {
-    match view.arm().map(|arm| arm.joints.motor_state()) {
+    match view.motor_state() {
         Some(motor_state::SERVO) => KeyAction::Send(command),
         Some(_) => {
             view.show_note("the motors are off: s, then h, makes the arm hold where it is");
@@ -187,8 +189,8 @@ pub(super) const fn jog_keys(axes: Option<JogAxes>) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::commands::monitor::plot_kind::PlotKind;
-    use crate::commands::monitor::view::tests::watching;
+    use crate::commands::monitor::view::ArmEvent;
+    use crate::commands::monitor::view::tests::{sample_in, watching};
 
     fn pressed(view: &mut MonitorView, keys: &[KeyCode]) -> Vec<KeyAction> {
         keys.iter().map(|&key| press(view, KeyEvent::from(key))).collect()
@@ -239,6 +241,23 @@ mod tests {
         assert_eq!(view.dialog, Some(Dialog::Help));
         let ctrl_c = KeyEvent::new(KeyCode::Char('c'), KeyModifiers::CONTROL);
         assert_eq!(press(&mut view, ctrl_c), KeyAction::Stop);
+    }
+
+    #[test]
+    fn a_frozen_screen_does_not_hide_motors_that_are_off() {
+        let mut view = watching();
+        view.is_frozen = true;
+        view.update(ArmEvent::Sample(sample_in(motor_state::FORCELESS, 20_000, 120)));
+        assert_eq!(pressed(&mut view, &[KeyCode::Left]), [KeyAction::Redraw]);
+        assert_eq!(view.note().map(|note| note.contains("the motors are off")), Some(true));
+    }
+
+    #[test]
+    fn an_arm_without_velocities_shows_positions() {
+        let mut view = watching();
+        view.plot = PlotKind::Load;
+        pressed(&mut view, &[KeyCode::Char('p')]);
+        assert_eq!(view.plot, PlotKind::Position);
     }
 
     #[test]

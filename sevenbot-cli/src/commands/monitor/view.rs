@@ -139,6 +139,8 @@ pub(crate) struct MonitorView {
     pub(crate) connection: LinkState,
     /// The last sample, or the frozen one.
     pub(crate) sample: Option<ArmSample>,
+    /// In the last sample, also while the screen is frozen.
+    motor_state: Option<u8>,
     /// The samples of the last [`PLOT_SPAN`], oldest first.
     pub(crate) past: VecDeque<PastSample>,
     pub(crate) plot: PlotKind,
@@ -160,6 +162,7 @@ impl MonitorView {
             port: port.to_owned(),
             connection: LinkState::Looking("opening the port".to_owned()),
             sample: None,
+            motor_state: None,
             past: VecDeque::new(),
             plot,
             now: Duration::ZERO,
@@ -201,6 +204,7 @@ impl MonitorView {
 
     fn add_sample(&mut self, sample: ArmSample) {
         self.link.answer(&sample);
+        self.motor_state = Some(sample.joints.motor_state());
         if self.is_frozen {
             return;
         }
@@ -226,6 +230,11 @@ impl MonitorView {
     pub(crate) fn arm(&self) -> Option<&ArmSample> {
         self.sample.as_ref().filter(|_| matches!(self.connection, LinkState::Open { .. }))
     }
+
+    /// The motor state in the last sample, while the arm is connected.
+    pub(crate) fn motor_state(&self) -> Option<u8> {
+        self.arm().and(self.motor_state)
+    }
 }
 
 #[cfg(test)]
@@ -247,8 +256,13 @@ pub(crate) mod tests {
 
     /// A sample in which joint 2 stands at `position` on its way to 120 degrees.
     pub(crate) fn sample(millis: u64, position: u8) -> ArmSample {
+        sample_in(1, millis, position)
+    }
+
+    /// As [`sample`], in a motor state.
+    pub(crate) fn sample_in(motor_state: u8, millis: u64, position: u8) -> ArmSample {
         let mut registers = zeros(JointSnapshot::REGISTERS);
-        set(&mut registers, MOTOR_STATE.address, &[1]);
+        set(&mut registers, MOTOR_STATE.address, &[motor_state]);
         set(&mut registers, SPEED.address, &[10; 7]);
         set(&mut registers, TARGET_POSITION.address, &[90, 120, 65, 90, 90, 90, 80]);
         set(&mut registers, PRESENT_POSITION.address, &[90, position, 65, 90, 90, 90, 80]);
@@ -292,7 +306,7 @@ pub(crate) mod tests {
         view.is_frozen = true;
         view.tick(Duration::from_secs(60));
         view.update(ArmEvent::Sample(sample(60_000, 120)));
-        assert_eq!(view.link.answers, 101);
+        assert_eq!((view.link.answers, view.motor_state()), (101, Some(1)));
         assert_eq!((view.now, view.past.len()), (Duration::from_millis(9900), 100));
     }
 

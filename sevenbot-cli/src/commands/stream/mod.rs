@@ -31,7 +31,7 @@ use crate::command_error::CommandError;
 use crate::guard_args::{GuardArgs, warn_of};
 use crate::interrupt::{Interrupt, hold_on_interrupt};
 use crate::session::Session;
-use crate::watch::ProgressWatch;
+use crate::watch::{ProgressWatch, note_slow_joints};
 
 /// Stream set-points from standard input, in hundredths of a degree.
 ///
@@ -143,6 +143,7 @@ pub(crate) fn run(session: &mut Session, args: &StreamArgs) -> Result<(), Comman
         return Err(StreamError::NoExtendedBlock.into());
     }
     arm.driven_joints()?;
+    note_slow_joints(&mut arm)?;
     let refused_before = refused(arm.status()?);
     let mut tracking = Tracking::new(arm.fine_targets()?, options.period());
     let start = StreamStart { rule: args.approach.rule(), first: FirstPoints::default() };

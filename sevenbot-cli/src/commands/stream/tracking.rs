@@ -12,7 +12,7 @@ const KEPT: Duration = Duration::from_secs(2);
 const ELSEWHERE: f64 = 3.0;
 
 /// The points that were sent, and the errors so far.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Tracking {
     /// The time from sending a point until the joints should be there.
     delay: Duration,
@@ -38,7 +38,7 @@ impl Tracking {
     pub(super) fn new(targets: [FineAngle; 7], period: Duration) -> Self {
         let pose = targets.map(FineAngle::degrees);
         let (sent, delay) = (VecDeque::new(), period * 3 / 2);
-        Self { delay, sent, pose, squares: 0.0, count: 0, largest: (0.0, 0) }
+        Self { delay, sent, pose, squares: 0.0, count: 0, largest: (0.0, 1) }
     }
 
     /// Adds a point that was sent.
@@ -117,6 +117,9 @@ mod tests {
         }
         tracking.add_measured(at(10), &pose(120.0));
         assert_eq!(tracking.error(), None, "nothing was due yet");
+        let mut exact = tracking.clone();
+        exact.add_measured(at(30 + 50), &pose(92.5));
+        assert_eq!(exact.error(), Some(TrackingError { rms: 0.0, largest: 0.0, joint: 1 }));
         tracking.add_measured(at(30 + 50), &pose(92.5));
         let mut late = pose(92.5);
         late[2] = FineAngle::from_degrees(93.5);

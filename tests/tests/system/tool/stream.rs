@@ -76,6 +76,18 @@ fn stream(arm: &mut TestArm, options: &[&str], lines: &str) -> Output {
     output
 }
 
+#[test]
+fn a_stream_tells_which_joints_are_slow() {
+    with_arm(TestSetup::any(), |arm| {
+        arm.write(SPEED, &[5]);
+        let text = all_output(&stream(arm, &[], "0,90,90,65,90,90,90,80\n"));
+        assert!(text.contains("joint 1: 9.5 degrees/s, as the registers of speed"), "{text}");
+        arm.write(SPEED, &[60]);
+        let text = all_output(&stream(arm, &[], "0,90,90,65,90,90,90,80\n"));
+        assert!(!text.contains("the registers of speed"), "{text}");
+    });
+}
+
 fn fine_target(arm: &mut TestArm, joint: u8) -> u16 {
     arm.counter(FINE_TARGET + 2 * (joint - 1))
 }

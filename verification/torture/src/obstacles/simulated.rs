@@ -18,6 +18,14 @@ pub struct SimulatedObstacleArm {
     now: Instant,
 }
 
+impl SimulatedObstacleArm {
+    fn send(&mut self, request: &Request<'_>) {
+        let mut frame = FrameBuffer::new();
+        request.encode(&mut frame);
+        self.world.host_send(self.now, &frame);
+    }
+}
+
 impl ObstacleArm for SimulatedObstacleArm {
     type Error = Infallible;
 
@@ -36,13 +44,15 @@ impl ObstacleArm for SimulatedObstacleArm {
     }
 
     fn write(&mut self, address: u8, values: &[u8]) -> Result<(), Infallible> {
-        let mut frame = FrameBuffer::new();
-        Request::Write { address, values }.encode(&mut frame);
-        self.world.host_send(self.now, &frame);
+        self.send(&Request::Write { address, values });
         Ok(())
     }
 
     fn read(&mut self, address: u8) -> Result<u8, Infallible> {
+        // The arm updates some registers only when a host reads them.
+        self.send(&Request::Read { address, count: 1 });
+        self.world.advance(self.now, true);
+        self.world.host_take(self.world.host_received().len());
         Ok(self.world.controller().registers().get(address))
     }
 
