@@ -6,6 +6,7 @@ use std::fs;
 use std::io::{Read, Write};
 use std::os::unix::net::UnixStream;
 use std::path::Path;
+use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use crate::sim::{Bus, Sim};
@@ -110,11 +111,14 @@ fn the_servos_behind_a_socket_move_on_without_a_controller() {
     }
     drop(controller);
     let turned = || {
-        let lines = fs::read_to_string(&angles).unwrap();
-        let joint_1 = lines.lines().last()?.split(',').nth(1)?.parse::<f64>().ok()?;
+        // The last line may be incomplete.
+        let text = fs::read_to_string(&angles).unwrap();
+        let (whole, _) = text.rsplit_once('\n')?;
+        let joint_1 = whole.lines().last()?.split(',').nth(1)?.parse::<f64>().ok()?;
         Some((joint_1 - 90.0).abs())
     };
     while turned().is_none_or(|degrees| degrees < 30.0) {
         assert!(Instant::now() < end, "{:?} degrees", turned());
+        sleep(Duration::from_millis(50));
     }
 }
