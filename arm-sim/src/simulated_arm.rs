@@ -17,8 +17,10 @@ use motion_core::servo_bus::TorqueCodes;
 use motion_core::vacuum::Vacuum;
 use motion_core::{Config, Controller, Output};
 use protocol_core::registers::RegisterFile;
+use protocol_core::request::Request;
 use protocol_core::settings::Settings;
 use protocol_core::time::{Duration, Instant};
+use protocol_core::wire::FrameBuffer;
 use protocol_core::wire::deframer::gap;
 use tracing::info;
 
@@ -212,6 +214,13 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
         self.record_sent(bytes.get(..accepted).unwrap_or(bytes));
         self.process(now, false);
         accepted
+    }
+
+    /// As [`Self::host_send`], for the frame of a request.
+    pub fn host_request(&mut self, now: Instant, request: &Request<'_>) -> usize {
+        let mut frame = FrameBuffer::new();
+        request.encode(&mut frame);
+        self.host_send(now, &frame)
     }
 
     /// The first bytes that have arrived at the host, possibly not all of them. They fill the line until

@@ -57,18 +57,14 @@ impl ServoSocket {
                 }
             }
             if controller.is_none() {
+                // The servos move on, and nobody hears their answers.
+                plant.poll(now);
                 controller = self.socket.accept()?;
                 controller.iter().for_each(|_| info!("controller connected"));
             }
-            let ended = match &mut controller {
-                Some(stream) => exchange(stream, &mut plant, now).err(),
-                None => {
-                    // Without a controller the servos move on, and nobody hears their answers.
-                    plant.poll(now);
-                    None
-                }
-            };
-            if let Some(end) = ended {
+            if let Some(stream) = &mut controller
+                && let Err(end) = exchange(stream, &mut plant, now)
+            {
                 info!("controller gone ({end})");
                 controller = None;
                 continue;

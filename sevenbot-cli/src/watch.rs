@@ -62,9 +62,8 @@ pub(crate) fn note_other_pace(arm: &mut Arm, targets: &FineTargets) -> Result<()
 }
 
 /// Tells the user which joints are slower than the default: no joint follows a stream faster than its speed.
-pub(crate) fn note_slow_joints(arm: &mut Arm) -> Result<(), CommandError> {
-    let all = arm.fine_targets()?.map(Some);
-    let mut slow = PaceBefore::read(arm, &all)?.other_than_default();
+pub(crate) fn note_slow_joints(arm: &mut Arm, targets: &FineTargets) -> Result<(), CommandError> {
+    let mut slow = PaceBefore::read(arm, targets)?.other_than_default();
     slow.retain(|(_, speed, _)| speed.degrees_per_second() < Speed::DEFAULT.degrees_per_second());
     note_paces(slow);
     Ok(())

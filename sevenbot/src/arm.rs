@@ -119,9 +119,8 @@ impl Arm {
         self.view.map
     }
 
-    /// Does the arm have this register? Registers that only map 2.1 has are missing in the maker's firmware 2.2.
-    /// [`OPTIONS`](crate::map21::OPTIONS) and registers 128 to 199 are in this project's firmware only. `true` for all other
-    /// addresses, also for unused ones and those of a status block that the firmware lacks.
+    /// Does the arm have this register? The maker's firmware 2.2 lacks those of map 2.1 alone, [`OPTIONS`](crate::map21::OPTIONS)
+    /// and 128 to 199 need this project's firmware, and all other addresses count as present, even unused ones.
     #[must_use]
     pub fn serves(&self, address: u8) -> bool {
         self.view.serves(address)

@@ -85,7 +85,7 @@ pub(crate) fn experiment(name: &str) -> TaskResult {
 /// Builds the image, and tests its start in the emulator.
 pub(crate) fn start_up() -> TaskResult {
     emulator::need_qemu().and_then(|()| build_image())?;
-    cargo(&format!("test {TESTED} --test start_up -- --include-ignored"))
+    cargo(&format!("test {TESTED} --test start_up -- --include-ignored --nocapture"))
 }
 
 /// Builds the simulator through one of its tests, so that cargo selects the same features as for all tests.

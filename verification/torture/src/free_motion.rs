@@ -10,7 +10,6 @@ use motion_core::TorqueCodes;
 use protocol_core::registers::map::{BLOCKED_JOINTS, LET_GO_JOINTS};
 use protocol_core::request::Request;
 use protocol_core::time::{Duration, Instant};
-use protocol_core::wire::FrameBuffer;
 
 use crate::shared::free_moves::{FreeMoves, Step};
 
@@ -121,9 +120,7 @@ impl MovedArm {
     }
 
     fn send(&mut self, request: &Request<'_>, wait_ms: u64) {
-        let mut frame = FrameBuffer::new();
-        request.encode(&mut frame);
-        self.arm.host_send(self.now, &frame);
+        self.arm.host_request(self.now, request);
         self.pass(Duration::from_millis(wait_ms));
     }
 

@@ -15,7 +15,6 @@ use protocol_core::registers::map::TARGET_POSITION;
 use protocol_core::registers::{JOINTS, Joint};
 use protocol_core::request::Request;
 use protocol_core::time::{Duration, Instant};
-use protocol_core::wire::FrameBuffer;
 
 use crate::panic_handler::{FRAMES, damping_frame};
 use crate::seeded_rng::SeededRng;
@@ -118,9 +117,8 @@ impl PosedArm {
         let world = SimulatedArm::new(now, setup, Flash::in_memory(), Plant::new(now));
         let mut arm = Self { world, now, rest: [0; JOINTS], sag: Sag::default() };
         arm.run(SETTLE_TIME);
-        let mut frame = FrameBuffer::new();
-        Request::Write { address: TARGET_POSITION.address, values: &POSE }.encode(&mut frame);
-        arm.world.host_send(arm.now, &frame);
+        let request = Request::Write { address: TARGET_POSITION.address, values: &POSE };
+        arm.world.host_request(arm.now, &request);
         arm.run(SETTLE_TIME);
         arm.rest = arm.angles();
         arm.sag = Sag::default();

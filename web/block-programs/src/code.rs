@@ -8,7 +8,7 @@ use crate::fault::BlockId;
 use crate::program::{Arithmetic, Comparison, Variable};
 use crate::value::Value;
 
-/// One step of the machine. Its operands are on top of the stack, the last one topmost.
+/// One instruction of the machine. Its operands are on top of the stack, the last one topmost.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum MachineInstruction {
     /// A block begins: the interpreter returns an event, so that its caller decides when to go on.
@@ -59,7 +59,7 @@ pub(crate) enum Act {
     Wait,
 }
 
-/// A step and the block that it belongs to.
+/// An instruction and the block that it belongs to.
 pub(crate) type LocatedInstruction = (MachineInstruction, BlockId);
 
 /// All instructions of a program: first the body of the program, which ends with [`MachineInstruction::End`], then the functions.

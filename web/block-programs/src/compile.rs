@@ -32,13 +32,13 @@ struct Loop {
 }
 
 impl Compiler {
-    fn add(&mut self, step: MachineInstruction, block: &BlockId) {
-        self.instructions.push((step, block.clone()));
+    fn add(&mut self, instruction: MachineInstruction, block: &BlockId) {
+        self.instructions.push((instruction, block.clone()));
     }
 
     /// As [`Self::add`]. Returns the index of the instruction.
-    fn place(&mut self, step: MachineInstruction, block: &BlockId) -> usize {
-        self.add(step, block);
+    fn place(&mut self, instruction: MachineInstruction, block: &BlockId) -> usize {
+        self.add(instruction, block);
         self.instructions.len() - 1
     }
 

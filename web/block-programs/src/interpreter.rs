@@ -71,9 +71,9 @@ impl Interpreter {
     /// # Errors
     /// A number is out of range or not finite, or too many calls are open. The error names the block.
     pub fn advance(&mut self) -> Result<ProgramEvent, ProgramError> {
-        while let Some((step, block)) = self.code.instructions.get(self.next).cloned() {
+        while let Some((instruction, block)) = self.code.instructions.get(self.next).cloned() {
             self.next += 1;
-            if let Some(event) = self.step(step, &block).map_err(|fault| fault.at(&block))? {
+            if let Some(event) = self.execute(instruction, &block).map_err(|fault| fault.at(&block))? {
                 return Ok(event);
             }
         }
@@ -85,12 +85,12 @@ impl Interpreter {
         self.stack.push(value);
     }
 
-    fn step(
+    fn execute(
         &mut self,
-        step: MachineInstruction,
+        instruction: MachineInstruction,
         block: &BlockId,
     ) -> Result<Option<ProgramEvent>, ProgramFault> {
-        match step {
+        match instruction {
             MachineInstruction::Begin => return Ok(Some(ProgramEvent::Begin(block.clone()))),
             MachineInstruction::Sense(sensor) => return Ok(Some(ProgramEvent::Sensor(sensor))),
             MachineInstruction::Act(act) => return Ok(Some(ProgramEvent::Command(self.command(act)?))),
@@ -122,14 +122,14 @@ impl Interpreter {
                 self.stack.push(value);
             }
             MachineInstruction::Pop => drop(self.pop()),
-            _ => self.flow(step)?,
+            _ => self.flow(instruction)?,
         }
         Ok(None)
     }
 
-    /// Carries out the steps that change the order of the instructions: jumps, loops, calls and returns.
-    fn flow(&mut self, step: MachineInstruction) -> Result<(), ProgramFault> {
-        match step {
+    /// Carries out jumps, loops, calls and returns.
+    fn flow(&mut self, instruction: MachineInstruction) -> Result<(), ProgramFault> {
+        match instruction {
             MachineInstruction::Jump(to) => self.next = to,
             MachineInstruction::JumpIfFalse(to) => {
                 self.next = if self.pop().truth() { self.next } else { to }

@@ -143,9 +143,10 @@ pub(crate) fn run(session: &mut Session, args: &StreamArgs) -> Result<(), Comman
         return Err(StreamError::NoExtendedBlock.into());
     }
     arm.driven_joints()?;
-    note_slow_joints(&mut arm)?;
+    let targets = arm.fine_targets()?;
+    note_slow_joints(&mut arm, &targets.map(Some))?;
     let refused_before = refused(arm.status()?);
-    let mut tracking = Tracking::new(arm.fine_targets()?, options.period());
+    let mut tracking = Tracking::new(targets, options.period());
     let start = StreamStart { rule: args.approach.rule(), first: FirstPoints::default() };
     let done = arm.with_reports(FEEDBACK_HZ, report_content::FINE_POSITIONS, |arm| {
         hold_on_interrupt(arm, |arm, interrupt| stream(arm, interrupt, args, start, &mut tracking))

@@ -8,7 +8,6 @@ use arm_sim::simulated_arm::{ArmConfig, SimulatedArm};
 use motion_core::TorqueCodes;
 use protocol_core::request::Request;
 use protocol_core::time::{Duration, Instant};
-use protocol_core::wire::FrameBuffer;
 
 use super::arm::ObstacleArm;
 
@@ -16,14 +15,6 @@ use super::arm::ObstacleArm;
 pub struct SimulatedObstacleArm {
     world: SimulatedArm<Flash>,
     now: Instant,
-}
-
-impl SimulatedObstacleArm {
-    fn send(&mut self, request: &Request<'_>) {
-        let mut frame = FrameBuffer::new();
-        request.encode(&mut frame);
-        self.world.host_send(self.now, &frame);
-    }
 }
 
 impl ObstacleArm for SimulatedObstacleArm {
@@ -44,13 +35,13 @@ impl ObstacleArm for SimulatedObstacleArm {
     }
 
     fn write(&mut self, address: u8, values: &[u8]) -> Result<(), Infallible> {
-        self.send(&Request::Write { address, values });
+        self.world.host_request(self.now, &Request::Write { address, values });
         Ok(())
     }
 
     fn read(&mut self, address: u8) -> Result<u8, Infallible> {
         // The arm updates some registers only when a host reads them.
-        self.send(&Request::Read { address, count: 1 });
+        self.world.host_request(self.now, &Request::Read { address, count: 1 });
         self.world.advance(self.now, true);
         self.world.host_take(self.world.host_received().len());
         Ok(self.world.controller().registers().get(address))
